@@ -1,0 +1,55 @@
+# ravenpose: `make demo` runs the main job, `make test` all tests; both do the set-up that they need.
+# Needed beforehand: Rust with cargo, a C++ compiler, Python 3 and make.
+
+PREFIX ?= /usr/local
+DESTDIR ?=
+BUILD := build
+STAGE := $(CURDIR)/$(BUILD)/stage
+VERSION := 0.1.0
+CARGO ?= cargo
+# One profile for everything: every further one builds tract once more.
+CARGO_FLAGS := --release --locked
+CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
+# The examples find the library where it will be installed, relative to themselves.
+RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
+PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
+
+.PHONY: all build offline demo test install stage examples venv bench bench-ci faults clean
+
+all: build offline examples
+
+# --all-targets: tests and programs share one resolution of features, so nothing is built twice.
+build:
+	$(CARGO) build $(CARGO_FLAGS) --workspace --all-targets
+
+offline: build
+	cd offline && $(CARGO) build $(CARGO_FLAGS) --workspace --all-targets
+
+# Into a folder of our own, as a user would install it.
+stage: build
+	$(MAKE) --no-print-directory install PREFIX=$(STAGE) DESTDIR=
+
+install:
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose
+	install -d $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/ravenpose/models $(DESTDIR)$(PREFIX)/share/doc/ravenpose
+	install -m 755 target/release/ravenposed $(DESTDIR)$(PREFIX)/bin/
+	if [ -x target/release/ravenpose ]; then install -m 755 target/release/ravenpose $(DESTDIR)$(PREFIX)/bin/; fi
+	install -m 644 bridge/include/ravenpose.h bridge/include/ravenpose.hpp $(DESTDIR)$(PREFIX)/include/
+	install -m 644 target/release/libravenpose_bridge.a $(DESTDIR)$(PREFIX)/lib/
+	install -m 755 target/release/libravenpose_bridge.so $(DESTDIR)$(PREFIX)/lib/libravenpose_bridge.so.1
+	ln -sf libravenpose_bridge.so.1 $(DESTDIR)$(PREFIX)/lib/libravenpose_bridge.so
+	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' bridge/pkgconfig/ravenpose.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/ravenpose.pc
+	install -m 644 bridge/cmake/ravenposeConfig.cmake $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/
+	sed -e 's|@VERSION@|$(VERSION)|' bridge/cmake/ravenposeConfigVersion.cmake.in > $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/ravenposeConfigVersion.cmake
+	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 $(DESTDIR)$(PREFIX)/share/ravenpose/models/
+	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
+
+# Against the staged installation, as C99 and C++17, without a warning.
+examples: stage
+	for f in bridge/examples/c/*.c; do \
+	  $(CC) -std=c99 $(CFLAGS_STRICT) -I$(STAGE)/include $$f -o $(STAGE)/bin/$$(basename $$f .c) -L$(STAGE)/lib -lravenpose_bridge $(RPATH) || exit 1; done
+	for f in bridge/examples/cxx/*.cpp; do \
+	  $(CXX) -std=c++17 $(CFLAGS_STRICT) -I$(STAGE)/include $$f -o $(STAGE)/bin/$$(basename $$f .cpp) -L$(STAGE)/lib -lravenpose_bridge $(RPATH) || exit 1; done
+
+clean:
+	rm -rf $(BUILD) target

@@ -1,0 +1,177 @@
+// The client of `make demo`: takes every pose, checks each field against the replayed file, and prints what it saw.
+//
+// usage: demo_client FILE [--core N]
+// Ends when the poses have been stale for half a second, or on SIGTERM. Exit status 1 if a message was lost without being counted,
+// came out of order, or had a wrong field.
+#include <sched.h>
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <ravenpose.hpp>
+#include <string>
+#include <vector>
+
+namespace {
+
+volatile std::sig_atomic_t stop = 0;
+
+struct Arm {
+  uint64_t poses = 0, valid = 0, fallback = 0, starting = 0;
+  double sum2 = 0, largest = 0;  // of the correction, um
+  uint32_t flags = 0;
+};
+
+double quantile(std::vector<int64_t> &values, double q) {
+  if (values.empty()) return 0;
+  const auto index = std::min(values.size() - 1, static_cast<size_t>(q * static_cast<double>(values.size())));
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index), values.end());
+  return static_cast<double>(values[index]) / 1000.0;
+}
+
+void row(const char *name, std::vector<int64_t> &values) {
+  std::printf("  %-34s %9.1f %9.1f %9.1f %9.1f\n", name, quantile(values, 0.5), quantile(values, 0.99), quantile(values, 0.999),
+              quantile(values, 1.0));
+}
+
+// Does the pose carry what the file says for this state?
+bool right(const ravenpose_pose &pose, const ravenpose_state &state) {
+  for (uint32_t arm = 0; arm < 2; ++arm) {
+    const ravenpose_arm_pose &out = pose.arm[arm];
+    if (out.status == RAVENPOSE_STATUS_ABSENT) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (out.raw_position_um[axis] != state.pos[3 * arm + axis]) return false;
+      if (out.corrected_position_um[axis] != out.raw_position_um[axis] + out.correction_um[axis]) return false;
+      if (out.status != RAVENPOSE_STATUS_VALID && out.correction_um[axis] != 0.0) return false;
+    }
+    if (std::memcmp(out.orientation, &state.ori[9 * arm], sizeof out.orientation) != 0) return false;
+  }
+  return pose.runlevel == state.runlevel;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) try {
+  std::string path;
+  int core = -1;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) == "--core" && i + 1 < argc) core = std::atoi(argv[++i]);
+    else path = argv[i];
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (bytes.size() < 64 || std::memcmp(bytes.data(), "RVNSTATE", 8) != 0) {
+    std::fprintf(stderr, "demo_client: %s: not a state file; make it with `ravenpose convert`\n", path.c_str());
+    return 2;
+  }
+  std::vector<ravenpose_state> states((bytes.size() - 64) / sizeof(ravenpose_state));
+  std::memcpy(states.data(), bytes.data() + 64, states.size() * sizeof(ravenpose_state));
+
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop = 1; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  if (core >= 0) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET(core, &set);
+    sched_setaffinity(0, sizeof set, &set);
+  }
+
+  ravenpose::Options options;
+  options.queue_depth = 64;
+  ravenpose::PoseReader reader(options);
+  mlockall(MCL_CURRENT | MCL_FUTURE);
+  std::vector<int64_t> to_service, in_service, to_client, whole;
+  for (auto *values : {&to_service, &in_service, &to_client, &whole}) values->reserve(states.size());
+
+  Arm arms[2];
+  uint64_t received = 0, answered = 0, wrong = 0, reordered = 0, overflowed = 0, last_sequence = 0, last_source = 0;
+  uint64_t stale = 0;
+  ravenpose_pose last{};
+  int64_t quiet_since = ravenpose_now_ns();
+  while (!stop) {
+    const auto pose = reader.next();
+    if (!pose) {
+      if (reader.code() < 0) {
+        std::fprintf(stderr, "demo_client: %s\n", ravenpose_error_text(reader.code()));
+        return 1;
+      }
+      timespec pause{0, 50000};
+      nanosleep(&pause, nullptr);
+      if (answered > 0 && ravenpose_now_ns() - quiet_since > 500000000) break;
+      continue;
+    }
+    const int64_t now = ravenpose_now_ns();
+    ++received;
+    if (last_sequence != 0 && pose->sequence <= last_sequence) ++reordered;
+    else if (last_sequence != 0) overflowed += pose->sequence - last_sequence - 1;
+    last_sequence = pose->sequence;
+    if (pose->source_sequence < last_source) ++reordered;
+    const bool repeats = pose->source_sequence == last_source;
+    last_source = pose->source_sequence;
+    last = *pose;
+    if (pose->source_sequence == 0 || pose->source_sequence > states.size() || !right(*pose, states[pose->source_sequence - 1])) {
+      if (++wrong == 1) std::fprintf(stderr, "demo_client: wrong field in the pose of state %llu\n", (unsigned long long)last_source);
+    }
+    if (repeats) {
+      ++stale;
+      continue;
+    }
+    quiet_since = now;
+    ++answered;
+    to_service.push_back(pose->start_time_ns - pose->source_time_ns);
+    in_service.push_back(pose->publish_time_ns - pose->start_time_ns);
+    to_client.push_back(now - pose->publish_time_ns);
+    whole.push_back(pose->publish_time_ns - pose->source_time_ns);
+    for (uint32_t arm = 0; arm < 2; ++arm) {
+      const ravenpose_arm_pose &out = pose->arm[arm];
+      if (out.status == RAVENPOSE_STATUS_ABSENT) continue;
+      Arm &sum = arms[arm];
+      ++sum.poses;
+      sum.flags |= out.flags;
+      if (out.status == RAVENPOSE_STATUS_VALID) ++sum.valid;
+      else if (out.status == RAVENPOSE_STATUS_FALLBACK) ++sum.fallback;
+      else ++sum.starting;
+      double norm2 = 0;
+      for (double value : out.correction_um) norm2 += value * value;
+      sum.sum2 += norm2;
+      sum.largest = std::max(sum.largest, std::sqrt(norm2));
+    }
+  }
+
+  const uint64_t unaccounted = last_source - answered - last.skipped - last.lost;
+  std::printf("  states answered %llu of %llu; overtaken by a newer one (counted) %llu, lost before the service (counted) %llu\n",
+              (unsigned long long)answered, (unsigned long long)last_source, (unsigned long long)last.skipped,
+              (unsigned long long)last.lost);
+  std::printf("  poses received %llu (%llu of them repeat the last state as stale), not accounted for %llu, missed by this client %llu, "
+              "reordered %llu, wrong fields %llu\n\n",
+              (unsigned long long)received, (unsigned long long)stale, (unsigned long long)unaccounted, (unsigned long long)overflowed,
+              (unsigned long long)reordered, (unsigned long long)wrong);
+  std::printf("  %-34s %9s %9s %9s %9s\n", "latency, us", "p50", "p99", "p99.9", "max");
+  row("state sent -> service takes it", to_service);
+  row("service takes it -> pose sent", in_service);
+  row("state sent -> pose sent", whole);
+  row("pose sent -> client reads (sleeping)", to_client);
+  std::printf("\n  %-6s %8s %8s %9s %9s   %s\n", "arm", "poses", "valid", "starting", "fallback", "corrected minus raw: RMS, largest");
+  for (uint32_t arm = 0; arm < 2; ++arm) {
+    const Arm &sum = arms[arm];
+    if (sum.poses == 0) continue;
+    std::printf("  %-6s %8llu %8llu %9llu %9llu   %.3f mm, %.3f mm\n", arm == 0 ? "gold" : "green", (unsigned long long)sum.poses,
+                (unsigned long long)sum.valid, (unsigned long long)sum.starting, (unsigned long long)sum.fallback,
+                std::sqrt(sum.sum2 / static_cast<double>(sum.poses)) / 1000.0, sum.largest / 1000.0);
+    const ravenpose_arm_pose &out = last.arm[arm];
+    std::printf("         last: raw %.1f %.1f %.1f um, corrected %.1f %.1f %.1f um\n", out.raw_position_um[0], out.raw_position_um[1],
+                out.raw_position_um[2], out.corrected_position_um[0], out.corrected_position_um[1], out.corrected_position_um[2]);
+  }
+  if (answered == 0) std::fprintf(stderr, "demo_client: no pose came\n");
+  return answered == 0 || unaccounted != 0 || overflowed != 0 || reordered != 0 || wrong != 0 ? 1 : 0;
+} catch (const ravenpose::Error &error) {
+  std::fprintf(stderr, "demo_client: %s\n", error.what());
+  return 2;
+}

@@ -1,0 +1,131 @@
+//! The network as plain numbers.
+
+use std::collections::BTreeMap;
+
+/// Elementwise step before the first layer: `y[i] = (x[i] - shift[i]) * scale[i]`.
+///
+/// It is kept apart and never folded into the first weights: `(x - mean) / std` with a mean of 1e4 and a std of 1e-3 cancels
+/// catastrophically in float32 once it is written as `x * scale + offset`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InputScale {
+    /// Subtracted first, in the input's own units; one number per input.
+    pub shift: Vec<f32>,
+    /// Multiplied second, per unit of the input; one number per input.
+    pub scale: Vec<f32>,
+}
+
+/// The function after a layer's sum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Activation {
+    /// `y = x`
+    Identity,
+    /// `y = 1 / (1 + exp(-x))`
+    Sigmoid,
+    /// `y = tanh(x)`
+    Tanh,
+    /// `y = max(x, 0)`
+    Relu,
+    /// `y = x` for `x > 0`, otherwise `alpha * (exp(x) - 1)`
+    Elu {
+        /// The negative limit's distance from zero; finite.
+        alpha: f32,
+    },
+}
+
+impl Activation {
+    /// The function in double precision.
+    pub fn apply_f64(self, x: f64) -> f64 {
+        match self {
+            Self::Identity => x,
+            Self::Sigmoid => 1.0 / (1.0 + (-x).exp()),
+            Self::Tanh => x.tanh(),
+            // Not `max`: it would turn a NaN into 0 and hide it.
+            Self::Relu => {
+                if x < 0.0 {
+                    0.0
+                } else {
+                    x
+                }
+            }
+            Self::Elu { alpha } => {
+                if x < 0.0 {
+                    f64::from(alpha) * x.exp_m1()
+                } else {
+                    x
+                }
+            }
+        }
+    }
+}
+
+/// One dense layer: `y = activation(weights * x + bias)`. All numbers are finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dense {
+    /// Length of `x`.
+    pub inputs: usize,
+    /// Length of `y`.
+    pub outputs: usize,
+    /// Row-major `[outputs][inputs]`.
+    pub weights: Vec<f32>,
+    /// One number per output.
+    pub bias: Vec<f32>,
+    /// Applied to each output.
+    pub activation: Activation,
+}
+
+/// A network of dense layers, each taking the previous one's outputs. Units of input and output are the caller's business.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    /// Numbers that [`Network::evaluate_f64`] takes.
+    pub input_width: usize,
+    /// Numbers that it gives.
+    pub output_width: usize,
+    /// Step before the first layer, absent when it would change nothing.
+    pub input_scale: Option<InputScale>,
+    /// At least one layer.
+    pub layers: Vec<Dense>,
+    /// The file's `metadata_props`, as they stand there: unchecked text, to be escaped before it is printed.
+    pub metadata: BTreeMap<String, String>,
+}
+
+impl Network {
+    /// Evaluates in double precision: the reference for faster kernels, and slow (it allocates per layer).
+    ///
+    /// A NaN in the input comes out as NaN, unlike in tract.
+    ///
+    /// # Panics
+    ///
+    /// If `input` does not have `input_width` numbers.
+    pub fn evaluate_f64(&self, input: &[f32]) -> Vec<f64> {
+        assert_eq!(input.len(), self.input_width, "length of the input vector");
+        let scaled = scaled_f64(self.input_scale.as_ref(), input);
+        self.layers.iter().fold(scaled, |x, layer| layer.evaluate_f64(&x))
+    }
+
+    /// Numbers that a kernel has to read: weights, biases and input scaling.
+    pub fn parameter_count(&self) -> usize {
+        let layers: usize = self.layers.iter().map(|l| l.weights.len() + l.bias.len()).sum();
+        layers + self.input_scale.as_ref().map_or(0, |s| s.shift.len() + s.scale.len())
+    }
+}
+
+impl Dense {
+    fn evaluate_f64(&self, x: &[f64]) -> Vec<f64> {
+        let rows = self.weights.chunks_exact(self.inputs).zip(&self.bias);
+        rows.map(|(row, bias)| {
+            let sum: f64 = row.iter().zip(x).map(|(w, x)| f64::from(*w) * x).sum();
+            self.activation.apply_f64(sum + f64::from(*bias))
+        })
+        .collect()
+    }
+}
+
+pub(crate) fn scaled_f64(scale: Option<&InputScale>, input: &[f32]) -> Vec<f64> {
+    let plain = input.iter().map(|x| f64::from(*x));
+    match scale {
+        None => plain.collect(),
+        Some(InputScale { shift, scale }) => {
+            plain.zip(shift).zip(scale).map(|((x, m), s)| (x - f64::from(*m)) * f64::from(*s)).collect()
+        }
+    }
+}

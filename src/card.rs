@@ -1,0 +1,174 @@
+//! The model card: ONNX metadata that says what a network may be used for. `docs/models.md` describes every property.
+
+use crate::guard::Domain;
+use ravenpose_wire::{FEATURES, features};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Units that the network must speak: inputs exactly as published, output in mm.
+pub const UNITS: &str = "raven_state as published; position error in mm";
+/// Correction bound of a card that states none: the paper reports errors up to 10 mm.
+const BOUND_MM: f64 = 15.0;
+
+/// Why a card was refused; the caller adds the file's name.
+#[derive(Debug, Error, PartialEq)]
+pub enum CardError {
+    /// The property has another value than the service needs.
+    #[error("property {key} is {found:?}, expected {expected:?}; export the model again with this ravenpose")]
+    Mismatch {
+        /// Property name.
+        key: &'static str,
+        /// As found.
+        found: String,
+        /// As needed.
+        expected: String,
+    },
+    /// A needed property is absent.
+    #[error("property {key} is missing; a trained model states it, see docs/models.md")]
+    Missing {
+        /// Property name.
+        key: &'static str,
+    },
+    /// The numbers of a property cannot be used.
+    #[error("property {key}: {problem}")]
+    Numbers {
+        /// Property name.
+        key: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// One golden pair: an input and the output that the network gave when it was exported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Golden {
+    /// 118 features.
+    pub input: Vec<f32>,
+    /// Position error, mm.
+    pub output: [f64; 3],
+}
+
+/// What the metadata says.
+#[derive(Debug, Clone)]
+pub struct Card {
+    /// `ravenpose.trained_on` is absent or starts with "nothing".
+    pub untrained: bool,
+    /// `ravenpose.trained_on`.
+    pub trained_on: String,
+    /// Trained domain; `None` only for an untrained model.
+    pub domain: Option<Domain>,
+    /// Largest correction that the model stands for, mm.
+    pub bound_mm: f64,
+    /// 95 % half width per axis, mm; NaN if none is stated.
+    pub bound95_mm: [f64; 3],
+    /// Golden pairs.
+    pub golden: Vec<Golden>,
+}
+
+impl Card {
+    /// Reads the card. A model without `ravenpose.trained_on` counts as untrained and need not state a domain.
+    ///
+    /// # Errors
+    /// [`CardError`].
+    pub fn read(metadata: &BTreeMap<String, String>) -> Result<Self, CardError> {
+        let get = |key: &str| metadata.get(key).map(String::as_str);
+        let trained_on = get("ravenpose.trained_on").unwrap_or("").trim().to_owned();
+        let untrained = trained_on.is_empty() || trained_on.starts_with("nothing");
+        for (key, expected) in [("ravenpose.feature_layout", features::LAYOUT), ("ravenpose.units", UNITS)] {
+            match get(key) {
+                Some(found) if found == expected => {}
+                None if untrained => {}
+                None => return Err(CardError::Missing { key }),
+                Some(found) => {
+                    return Err(CardError::Mismatch { key, found: shorten(found), expected: expected.to_owned() });
+                }
+            }
+        }
+        let domain = domain(metadata, untrained)?;
+        let bound_mm = match get("ravenpose.correction_bound_mm") {
+            None => BOUND_MM,
+            Some(text) => {
+                let key = "ravenpose.correction_bound_mm";
+                let [bound] = numbers::<1>(key, text)?;
+                if bound <= 0.0 {
+                    return Err(CardError::Numbers { key, problem: format!("{bound} is not a positive length") });
+                }
+                f64::from(bound)
+            }
+        };
+        let bound95_mm = match get("ravenpose.bound95_mm") {
+            None => [f64::NAN; 3],
+            Some(text) => numbers::<3>("ravenpose.bound95_mm", text)?.map(f64::from),
+        };
+        let golden = golden(get("ravenpose.golden").unwrap_or(""))?;
+        if golden.is_empty() && !untrained {
+            return Err(CardError::Missing { key: "ravenpose.golden" });
+        }
+        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, golden })
+    }
+}
+
+fn domain(metadata: &BTreeMap<String, String>, untrained: bool) -> Result<Option<Domain>, CardError> {
+    const KEYS: [&str; 5] = [
+        "ravenpose.feature_min",
+        "ravenpose.feature_max",
+        "ravenpose.domain_center",
+        "ravenpose.domain_weight",
+        "ravenpose.domain_limit",
+    ];
+    if untrained && KEYS.iter().all(|key| !metadata.contains_key(*key)) {
+        return Ok(None);
+    }
+    let get = |key: &'static str| metadata.get(key).map(String::as_str).ok_or(CardError::Missing { key });
+    let domain = Domain {
+        min: numbers(KEYS[0], get(KEYS[0])?)?,
+        max: numbers(KEYS[1], get(KEYS[1])?)?,
+        center: numbers(KEYS[2], get(KEYS[2])?)?,
+        weight: numbers(KEYS[3], get(KEYS[3])?)?,
+        limit: numbers::<1>(KEYS[4], get(KEYS[4])?)?[0],
+    };
+    if let Some(feature) = (0..FEATURES).find(|&feature| domain.min[feature] > domain.max[feature]) {
+        let problem = format!("{} has a minimum above its maximum", features::name(feature));
+        return Err(CardError::Numbers { key: KEYS[0], problem });
+    }
+    if domain.limit <= 0.0 {
+        return Err(CardError::Numbers { key: KEYS[4], problem: format!("{} is not a positive distance", domain.limit) });
+    }
+    Ok(Some(domain))
+}
+
+fn golden(text: &str) -> Result<Vec<Golden>, CardError> {
+    text.lines()
+        .filter(|line| !line.trim().is_empty())
+        .map(|line| {
+            let row: [f64; FEATURES + 3] = parse("ravenpose.golden", line)?;
+            let output = [row[FEATURES], row[FEATURES + 1], row[FEATURES + 2]];
+            Ok(Golden { input: row[..FEATURES].iter().map(|&value| value as f32).collect(), output })
+        })
+        .collect()
+}
+
+fn numbers<const N: usize>(key: &'static str, text: &str) -> Result<[f32; N], CardError> {
+    Ok(parse::<N>(key, text)?.map(|value| value as f32))
+}
+
+fn parse<const N: usize>(key: &'static str, text: &str) -> Result<[f64; N], CardError> {
+    let wrong = |problem: String| CardError::Numbers { key, problem };
+    let mut out = [0.0; N];
+    let mut count = 0;
+    for word in text.split_ascii_whitespace() {
+        let value: f64 = word.parse().map_err(|_| wrong(format!("{:?} is not a number", shorten(word))))?;
+        if !(value as f32).is_finite() {
+            return Err(wrong(format!("{:?} is not a finite number", shorten(word))));
+        }
+        if let Some(to) = out.get_mut(count) {
+            *to = value;
+        }
+        count += 1;
+    }
+    if count == N { Ok(out) } else { Err(wrong(format!("{count} numbers, expected {N}"))) }
+}
+
+fn shorten(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).take(60).collect()
+}

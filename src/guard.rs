@@ -1,0 +1,153 @@
+//! Admission of the 118 inputs, before any arithmetic on them.
+//!
+//! The network cannot be trusted to show a bad input: sigmoids saturate, and some runtimes turn NaN into a plausible number. So every
+//! feature is compared with what the robot can produce at all ([`IMPOSSIBLE`]), with the range the model was trained on, and the
+//! features together with the trained domain by one scalar distance.
+
+use ravenpose_wire::{FEATURES, flag};
+
+/// Closed interval of a feature; outside of it the robot cannot be (units as published).
+#[derive(Debug, Clone, Copy)]
+pub struct Limit {
+    /// First feature.
+    pub start: usize,
+    /// Number of features.
+    pub count: usize,
+    /// Smallest possible value.
+    pub min: f32,
+    /// Largest possible value.
+    pub max: f32,
+}
+
+const fn limit(start: usize, count: usize, min: f32, max: f32) -> Limit {
+    Limit { start, count, min, max }
+}
+
+/// Limits that no RAVEN-II can leave, with a margin for homing errors. Sources: `raven2-plant.md` section 4 (hard stops), section 3
+/// (ratios), `raven2-plant.toml` (`dac_trip`, encoder), motor no-load speed 7580 rpm = 45,480 deg/s with a missed cycle in mind.
+pub const IMPOSSIBLE: [Limit; 31] = [
+    limit(0, 6, -500_000.0, 500_000.0), // pos, pos_d: the tip is within 0.5 m of the remote centre
+    limit(6, 18, -1.001, 1.001),        // ori, ori_d
+    limit(24, 8, -8_000_000.0, 8_000_000.0), // encVals: short of the wrap of a 24-bit counter
+    limit(32, 8, -20_000.0, 20_000.0),  // dac_val: above it the controller stops the robot
+    limit(40, 8, -100.0, 100.0),        // tau
+    limit(48, 8, -200_000.0, 200_000.0), // mpos: the longest travel is 0.6 m x 2158.6 rad/m = 74,000 deg, plus coupling
+    limit(56, 1, -10.0, 100.0),         // jpos: stops 0 and 90 deg, 10 deg of homing error
+    limit(57, 1, 35.0, 147.5),          // stops 45 and 137.5 deg
+    limit(58, 1, 10.3, 34.4),           // 0.18 to 0.6 m (stops 0.23 and 0.562 m) x 57.29578
+    limit(59, 1, -720.0, 720.0),        // slot 3 belongs to no joint
+    limit(60, 1, -360.0, 360.0),        // stop 330 deg
+    limit(61, 1, -120.0, 120.0),        // stop 100 deg
+    limit(62, 2, -140.0, 140.0),        // stops 120 deg
+    limit(64, 8, -100_000.0, 100_000.0), // mvel
+    limit(72, 2, -900.0, 900.0),        // jvel: mvel / ratio
+    limit(74, 1, -50.0, 50.0),          // 0.87 m/s
+    limit(75, 1, -720.0, 720.0),        // slot 3
+    limit(76, 4, -20_000.0, 20_000.0),  // published as 0
+    limit(80, 8, -200_000.0, 200_000.0), // mpos_d
+    limit(88, 1, -10.0, 100.0),         // jpos_d, as jpos
+    limit(89, 1, 35.0, 147.5),
+    limit(90, 1, 10.3, 34.4),
+    limit(91, 1, -720.0, 720.0),
+    limit(92, 1, -360.0, 360.0),
+    limit(93, 1, -120.0, 120.0),
+    limit(94, 2, -140.0, 140.0),
+    limit(96, 1, -7.0, 7.0),                  // grasp_d, rad
+    limit(97, 8, -8_000_000.0, 8_000_000.0),  // encoffsets
+    limit(105, 6, -1_000_000.0, 1_000_000.0), // jac_vel
+    limit(111, 6, -1_000_000.0, 1_000_000.0), // jac_f
+    limit(117, 1, 0.0, 0.1),                  // dt, s
+];
+
+/// The region that a model was trained on, from the model's metadata.
+#[derive(Debug, Clone)]
+pub struct Domain {
+    /// Smallest value of each feature in training.
+    pub min: [f32; FEATURES],
+    /// Largest value of each feature in training.
+    pub max: [f32; FEATURES],
+    /// Centre of the trained domain.
+    pub center: [f32; FEATURES],
+    /// Weight of each feature in the distance; 0 leaves it out.
+    pub weight: [f32; FEATURES],
+    /// Distance at the edge of the domain; the score is distance / limit.
+    pub limit: f32,
+}
+
+/// What the guard found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// Reasons for fallback, bits of [`flag`]; 0 if admitted.
+    pub reasons: u32,
+    /// Distance from the trained domain, 1 at its edge; -1 where it was not computed.
+    pub score: f32,
+}
+
+/// Checks the inputs of one arm.
+#[derive(Debug, Clone)]
+pub struct Guard {
+    min: [f32; FEATURES],
+    max: [f32; FEATURES],
+    domain: Option<Box<Domain>>,
+}
+
+impl Guard {
+    /// A guard for a model's domain, or with the robot's own limits alone.
+    pub fn new(domain: Option<Domain>) -> Self {
+        let mut guard = Self { min: [0.0; FEATURES], max: [0.0; FEATURES], domain: domain.map(Box::new) };
+        for limit in &IMPOSSIBLE {
+            for feature in limit.start..limit.start + limit.count {
+                guard.min[feature] = limit.min;
+                guard.max[feature] = limit.max;
+            }
+        }
+        guard
+    }
+
+    /// The closed interval of what the robot can produce, for one feature.
+    pub fn possible(&self, feature: usize) -> (f32, f32) {
+        (self.min[feature], self.max[feature])
+    }
+
+    /// Checks one arm's features. Comparisons are written so that NaN fails them.
+    pub fn check(&self, features: &[f32; FEATURES]) -> Verdict {
+        let mut finite = true;
+        let mut possible = true;
+        for ((value, min), max) in features.iter().zip(&self.min).zip(&self.max) {
+            finite &= value.is_finite();
+            possible &= *value >= *min && *value <= *max;
+        }
+        if !finite {
+            return Verdict { reasons: flag::INPUT_NOT_FINITE, score: -1.0 };
+        }
+        let mut verdict = Verdict { reasons: if possible { 0 } else { flag::INPUT_IMPOSSIBLE }, score: -1.0 };
+        if let Some(domain) = &self.domain {
+            domain.check(features, &mut verdict);
+        }
+        verdict
+    }
+}
+
+impl Domain {
+    fn check(&self, features: &[f32; FEATURES], verdict: &mut Verdict) {
+        let mut inside = true;
+        let mut squares = 0.0_f32;
+        for index in 0..FEATURES {
+            let value = features[index];
+            inside &= value >= self.min[index] && value <= self.max[index];
+            let distance = (value - self.center[index]) * self.weight[index];
+            squares += distance * distance;
+        }
+        verdict.score = squares.sqrt() / self.limit;
+        if !inside {
+            verdict.reasons |= flag::OUT_OF_RANGE;
+        }
+        // Written so that a NaN score is outside.
+        if !(verdict.score <= 1.0) {
+            verdict.reasons |= flag::OUT_OF_DOMAIN;
+        }
+        if !verdict.score.is_finite() {
+            verdict.score = f32::MAX;
+        }
+    }
+}

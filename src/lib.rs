@@ -1,0 +1,19 @@
+//! ravenpose, the hard-real-time part: from `raven/state` to `raven/pose`.
+//!
+//! Research software, no clinical use. `ARCHITECTURE.md` has the map. [`cycle`] is one period as a pure function; [`runner`] gives it a
+//! clock and shared memory; [`service`] starts it and is the ordinary thread beside it; everything else serves these three.
+
+pub mod card;
+pub mod config;
+pub mod cycle;
+pub mod frozen;
+pub mod guard;
+pub mod histogram;
+pub mod model;
+pub mod network;
+pub mod realtime;
+pub mod report;
+pub mod runner;
+pub mod service;
+pub mod shared;
+pub mod signals;

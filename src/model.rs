@@ -1,0 +1,209 @@
+//! From a file to a model that the loop may run: size, hash, import, card, plan, golden pairs. Each step refuses with one line.
+
+use crate::card::{Card, CardError};
+use crate::config::ModelSource;
+use crate::cycle::{Estimator, Model};
+use crate::guard::Guard;
+use crate::network::Plan;
+use ravenpose_importer::{Expected, ImportError, Network};
+use ravenpose_wire::FEATURES;
+use sha2::{Digest, Sha256};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Largest model file that is read: ten million float32 weights are 40 MB.
+const SIZE_MAX: u64 = 128 << 20;
+/// Largest difference to a golden output, relative to max(1, |value|): what float32 sums of this size differ by.
+const GOLDEN_TOLERANCE: f64 = 1e-4;
+/// Inputs and outputs of every model.
+pub const EXPECTED: Expected = Expected { inputs: FEATURES, outputs: 3 };
+
+/// Why a model was refused; one line that begins with the file.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// The file cannot be read.
+    #[error("{path}: cannot read the model: {cause}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// The reason.
+        cause: String,
+    },
+    /// No hash to compare with.
+    #[error(
+        "{path}: no usable hash beside the model ({cause}); run `sha256sum {name} > {name}.sha256` in its directory after checking where it comes from"
+    )]
+    NoHash {
+        /// The file.
+        path: String,
+        /// Its last component.
+        name: String,
+        /// The reason.
+        cause: String,
+    },
+    /// The file is not the one that the hash was taken of.
+    #[error("{path}: SHA-256 is {found}, expected {expected} (from {origin}); the file was changed or damaged, copy it again")]
+    Hash {
+        /// The file.
+        path: String,
+        /// As computed.
+        found: String,
+        /// As stated.
+        expected: String,
+        /// Where it was stated.
+        origin: String,
+    },
+    /// Not a network that can be run.
+    #[error("{path}: {cause}")]
+    Import {
+        /// The file.
+        path: String,
+        /// The reason.
+        cause: ImportError,
+    },
+    /// The metadata cannot be used.
+    #[error("{path}: {cause}")]
+    Card {
+        /// The file.
+        path: String,
+        /// The reason.
+        cause: CardError,
+    },
+    /// The network does not give what it gave when it was exported.
+    #[error(
+        "{path}: golden pair {index}: output {axis} is {found} mm, the card says {expected} mm; card and network do not belong together, export the model again"
+    )]
+    Golden {
+        /// The file.
+        path: String,
+        /// Which pair, from 0.
+        index: usize,
+        /// Which output.
+        axis: usize,
+        /// As computed.
+        found: f64,
+        /// As stated.
+        expected: f64,
+    },
+}
+
+impl Estimator for Plan {
+    fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+        Plan::run(self, features, error_mm);
+    }
+}
+
+/// Reads a model file of bounded size.
+///
+/// # Errors
+/// [`ModelError::Unreadable`].
+pub fn read(path: &Path) -> Result<Vec<u8>, ModelError> {
+    let unreadable = |cause: String| ModelError::Unreadable { path: path.display().to_string(), cause };
+    let file = std::fs::File::open(path).map_err(|cause| unreadable(cause.to_string()))?;
+    let metadata = file.metadata().map_err(|cause| unreadable(cause.to_string()))?;
+    if !metadata.is_file() {
+        return Err(unreadable("not a regular file".to_owned()));
+    }
+    if metadata.len() > SIZE_MAX {
+        return Err(unreadable(format!("{} bytes, more than the {SIZE_MAX} allowed", metadata.len())));
+    }
+    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    // The file may grow while it is read: never take more than was allowed.
+    let read = file.take(SIZE_MAX).read_to_end(&mut bytes).map_err(|cause| unreadable(cause.to_string()))?;
+    if read as u64 != metadata.len() {
+        return Err(unreadable("the file changed while it was read; try again".to_owned()));
+    }
+    Ok(bytes)
+}
+
+/// Imports a network as `ravenpose infer` does: no hash and no card wanted.
+///
+/// # Errors
+/// [`ModelError::Unreadable`] or [`ModelError::Import`].
+pub fn network(path: &Path) -> Result<Network, ModelError> {
+    import(path, &read(path)?)
+}
+
+fn import(path: &Path, bytes: &[u8]) -> Result<Network, ModelError> {
+    ravenpose_importer::import(bytes, &EXPECTED).map_err(|cause| ModelError::Import { path: path.display().to_string(), cause })
+}
+
+/// Loads a model as the service does: hash first, then import, card and golden pairs. The file is not needed afterwards.
+///
+/// # Errors
+/// Any [`ModelError`].
+pub fn load(source: &ModelSource) -> Result<(Model<Plan>, Card), ModelError> {
+    let path = source.path.display().to_string();
+    let bytes = read(&source.path)?;
+    let digest: [u8; 32] = Sha256::digest(&bytes).into();
+    check_hash(source, &path, &hex(&digest))?;
+    let network = import(&source.path, &bytes)?;
+    drop(bytes);
+    let card = Card::read(&network.metadata).map_err(|cause| ModelError::Card { path: path.clone(), cause })?;
+    let mut plan = Plan::new(&network);
+    check_golden(&path, &mut plan, &card)?;
+    let model = Model {
+        estimator: plan,
+        guard: Guard::new(card.domain.clone()),
+        id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
+        bound_um: card.bound_mm * 1000.0,
+        bound95_um: card.bound95_mm.map(|mm| mm * 1000.0),
+        untrained: card.untrained,
+    };
+    Ok((model, card))
+}
+
+fn hex(digest: &[u8]) -> String {
+    use std::fmt::Write;
+    digest.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+fn check_hash(source: &ModelSource, path: &str, found: &str) -> Result<(), ModelError> {
+    let (expected, origin) = match &source.sha256 {
+        Some(hash) => (hash.clone(), "the configuration".to_owned()),
+        None => stated_hash(&source.path)?,
+    };
+    if expected.eq_ignore_ascii_case(found) {
+        return Ok(());
+    }
+    Err(ModelError::Hash { path: path.to_owned(), found: found.to_owned(), expected, origin })
+}
+
+/// The hash in `FILE.sha256`, in the form that `sha256sum` writes.
+fn stated_hash(model: &Path) -> Result<(String, String), ModelError> {
+    let mut beside = model.as_os_str().to_owned();
+    beside.push(".sha256");
+    let beside = PathBuf::from(beside);
+    let no_hash = |cause: String| ModelError::NoHash {
+        path: model.display().to_string(),
+        name: model.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        cause,
+    };
+    let mut text = String::new();
+    let file = std::fs::File::open(&beside).map_err(|cause| no_hash(format!("{}: {cause}", beside.display())))?;
+    file.take(4096).read_to_string(&mut text).map_err(|cause| no_hash(format!("{}: {cause}", beside.display())))?;
+    let hash = text.split_ascii_whitespace().next().unwrap_or_default();
+    if hash.len() != 64 || !hash.chars().all(|c| c.is_ascii_hexdigit()) {
+        return Err(no_hash(format!("{} does not begin with 64 hexadecimal digits", beside.display())));
+    }
+    Ok((hash.to_owned(), beside.display().to_string()))
+}
+
+fn check_golden(path: &str, plan: &mut Plan, card: &Card) -> Result<(), ModelError> {
+    for (index, golden) in card.golden.iter().enumerate() {
+        let mut output = [0.0_f32; 3];
+        plan.run(&golden.input, &mut output);
+        for axis in 0..3 {
+            let (found, expected) = (f64::from(output[axis]), golden.output[axis]);
+            // Written so that NaN fails.
+            if !((found - expected).abs() <= GOLDEN_TOLERANCE * expected.abs().max(1.0)) {
+                return Err(ModelError::Golden { path: path.to_owned(), index, axis, found, expected });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! What the operating system must grant: a core, FIFO priority, locked memory.
+//!
+//! This module contains `unsafe`: the scheduler call, which no safe wrapper in our tree offers, and reading resource usage.
+
+use rustix::mm::MlockAllFlags;
+use rustix::thread::{CpuSet, sched_setaffinity};
+use std::fs::File;
+use std::io::Write;
+
+/// A guarantee that could not be had: what, and the exact remedy. One line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Missing {
+    /// What is missing and why.
+    pub what: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+impl std::fmt::Display for Missing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}; {}", self.what, self.remedy)
+    }
+}
+
+/// Locks all present and future memory of the process; locked pages are also touched.
+///
+/// # Errors
+/// [`Missing`] with the limit to raise.
+pub fn lock_memory() -> Result<(), Missing> {
+    rustix::mm::mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|cause| Missing {
+        what: format!("memory cannot be locked ({cause})"),
+        remedy: "set LimitMEMLOCK=infinity in the unit, or `* - memlock unlimited` in /etc/security/limits.d/ravenpose.conf"
+            .to_owned(),
+    })
+}
+
+/// Pins the calling thread to one core.
+///
+/// # Errors
+/// [`Missing`] when there is no such core or it is not allowed.
+pub fn pin(core: usize) -> Result<(), Missing> {
+    let refused = |cause: String| Missing {
+        what: format!("the loop cannot be pinned to core {core} ({cause})"),
+        remedy: "choose loop.core among the cores that `nproc --all` counts and CPUAffinity= of the unit allows".to_owned(),
+    };
+    if core >= CpuSet::MAX_CPU {
+        return Err(refused("no such core".to_owned()));
+    }
+    let mut set = CpuSet::new();
+    set.set(core);
+    sched_setaffinity(None, &set).map_err(|cause| refused(cause.to_string()))
+}
+
+/// Gives the calling thread SCHED_FIFO.
+///
+/// # Errors
+/// [`Missing`] with the limit to raise.
+pub fn set_fifo(priority: i32) -> Result<(), Missing> {
+    let parameter = libc::sched_param { sched_priority: priority };
+    // SAFETY: `parameter` is a valid sched_param for the duration of the call; 0 names the calling thread.
+    if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) } == 0 {
+        return Ok(());
+    }
+    Err(Missing {
+        what: format!("SCHED_FIFO priority {priority} is refused ({})", std::io::Error::last_os_error()),
+        remedy: format!(
+            "set LimitRTPRIO={priority} in the unit, or `raven - rtprio {priority}` in /etc/security/limits.d/ravenpose.conf"
+        ),
+    })
+}
+
+/// Would real-time throttling take the core away from a FIFO thread that never sleeps?
+///
+/// # Errors
+/// [`Missing`] when it would (measured: 50 ms of every second).
+pub fn throttling() -> Result<(), Missing> {
+    let path = "/proc/sys/kernel/sched_rt_runtime_us";
+    let allowed = std::fs::read_to_string(path).unwrap_or_default();
+    let allowed = allowed.trim();
+    if allowed == "-1" {
+        return Ok(());
+    }
+    Err(Missing {
+        what: format!(
+            "real-time throttling is on (sched_rt_runtime_us = {}): the kernel takes about 50 ms of every second from a thread that spins",
+            if allowed.is_empty() { "unknown" } else { allowed }
+        ),
+        remedy: "run `sysctl -w kernel.sched_rt_runtime_us=-1`, or choose wait = \"sleep\"".to_owned(),
+    })
+}
+
+/// Keeps the processor out of deep idle states for as long as the file is open.
+///
+/// # Errors
+/// [`Missing`] when the device cannot be used.
+pub fn hold_cpu_dma_latency() -> Result<File, Missing> {
+    let path = "/dev/cpu_dma_latency";
+    let mut file = File::options().write(true).open(path).map_err(|cause| Missing {
+        what: format!("{path} cannot be opened ({cause})"),
+        remedy: "add DeviceAllow=/dev/cpu_dma_latency rw to the unit and give the user write access, or set hold_cpu_dma_latency = false"
+            .to_owned(),
+    })?;
+    file.write_all(&0_i32.to_ne_bytes()).map_err(|cause| Missing {
+        what: format!("{path} cannot be written ({cause})"),
+        remedy: "set hold_cpu_dma_latency = false".to_owned(),
+    })?;
+    Ok(file)
+}
+
+/// Minor and major page faults of the calling thread so far.
+pub fn page_faults() -> (u64, u64) {
+    let mut usage = std::mem::MaybeUninit::<libc::rusage>::zeroed();
+    // SAFETY: the kernel fills the whole struct; zeroed memory is a valid rusage even if it did not.
+    let usage = unsafe {
+        libc::getrusage(libc::RUSAGE_THREAD, usage.as_mut_ptr());
+        usage.assume_init()
+    };
+    (usage.ru_minflt as u64, usage.ru_majflt as u64)
+}
+
+/// The calling thread's scheduling policy, priority and the cores that it may run on.
+pub fn scheduling() -> (i32, i32, Vec<usize>) {
+    let mut parameter = libc::sched_param { sched_priority: 0 };
+    // SAFETY: 0 names the calling thread; `parameter` is valid for the duration of the call.
+    let policy = unsafe {
+        libc::sched_getparam(0, &raw mut parameter);
+        libc::sched_getscheduler(0)
+    };
+    let cores = rustix::thread::sched_getaffinity(None)
+        .map(|set| (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect())
+        .unwrap_or_default();
+    (policy, parameter.sched_priority, cores)
+}

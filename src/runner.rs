@@ -1,0 +1,355 @@
+//! The loop: gives the pure cycle a clock, shared memory and a way to wait.
+//!
+//! After [`Runner::open`] nothing here allocates, locks, blocks (but for the one waiting call) or panics;
+//! `tests/allocation.rs` and `tests/realtime.rs` prove it over a million turns.
+
+use crate::config::Wait;
+use crate::cycle::{Cycle, Estimator, Limits, Stopwatch};
+use crate::histogram::{Recorder, Stage};
+use crate::shared::{Event, EventSender, LinkCounters, Shared};
+use ravenpose_transport::{Listener, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
+use ravenpose_wire::{ARMS, CorrectedPose, FALLBACK_REASONS, RavenState};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+
+/// Depth of the state queue: a backlog is skipped, but counted exactly up to this depth.
+const QUEUE: usize = 64;
+/// After this many periods without a state the loop stops polling around the expected time and looks once per period.
+const MISSES_MAX: u32 = 50;
+/// The loop sleeps at least this share of a period in `sleep` mode, so that real-time throttling never finds it.
+const SLEEP_SHARE: i64 = 4;
+
+/// A fault on demand, for tests of the watchdog and of overruns (`ravenposed --test-hook`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TestHook {
+    /// Published messages before the fault.
+    pub after: u64,
+    /// Number of turns that have it.
+    pub turns: u64,
+    /// Busy time in each, ns.
+    pub busy_ns: i64,
+}
+
+/// How the loop waits.
+pub struct Waiting {
+    /// Strategy.
+    pub wait: Wait,
+    /// Polling before a state is due, ns.
+    pub spin_ns: i64,
+}
+
+/// Why the loop ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// It was asked to stop.
+    Stopped,
+    /// It was asked to open its link anew.
+    Reopen,
+}
+
+struct Link {
+    reader: Reader<RavenState>,
+    writer: Writer<CorrectedPose>,
+    listener: Option<Listener>,
+}
+
+impl Link {
+    fn open(settings: &Settings, wait: Wait) -> Result<Self, TransportError> {
+        Ok(Self {
+            // The pose first: its one publisher's place tells whether another service runs.
+            writer: Writer::open(settings)?,
+            reader: Reader::open(settings, QUEUE)?,
+            listener: (wait == Wait::Event).then(|| Listener::open(settings)).transpose()?,
+        })
+    }
+}
+
+/// The loop and all that it owns.
+pub struct Runner<E> {
+    cycle: Cycle<E>,
+    limits: Limits,
+    waiting: Waiting,
+    link: Link,
+    pose: CorrectedPose,
+    recorder: Recorder,
+    events: EventSender,
+    shared: Arc<Shared>,
+    link_counters: LinkCounters,
+    misses: u32,
+    seen: Seen,
+    test_hook: Option<TestHook>,
+}
+
+/// What the last event said, so that only changes are reported.
+struct Seen {
+    arms: [u64; ARMS],
+    source_id: Option<u64>,
+    lost: u64,
+    refused: u64,
+    late: u64,
+    link_failures: u64,
+}
+
+/// Stage times of one turn.
+struct Laps {
+    last_ns: i64,
+    features_ns: i64,
+    inference_ns: i64,
+}
+
+impl Stopwatch for Laps {
+    fn features_done(&mut self) {
+        let now = now_ns();
+        self.features_ns += now - self.last_ns;
+        self.last_ns = now;
+    }
+
+    fn inference_done(&mut self) {
+        let now = now_ns();
+        self.inference_ns += now - self.last_ns;
+        self.last_ns = now;
+    }
+}
+
+impl<E: Estimator> Runner<E> {
+    /// Opens the link. Call it on the thread that will run the loop.
+    ///
+    /// # Errors
+    /// Any [`TransportError`] of opening.
+    pub fn open(
+        settings: &Settings,
+        cycle: Cycle<E>,
+        limits: Limits,
+        waiting: Waiting,
+        (recorder, events, shared): (Recorder, EventSender, Arc<Shared>),
+    ) -> Result<Self, TransportError> {
+        let link = Link::open(settings, waiting.wait)?;
+        Ok(Self {
+            cycle,
+            limits,
+            waiting,
+            link,
+            pose: CorrectedPose::new(),
+            recorder,
+            events,
+            shared,
+            link_counters: LinkCounters::default(),
+            misses: 0,
+            seen: Seen { arms: [0; ARMS], source_id: None, lost: 0, refused: 0, late: 0, link_failures: 0 },
+            test_hook: None,
+        })
+    }
+
+    /// Arms a fault for a test.
+    pub fn set_test_hook(&mut self, hook: TestHook) {
+        self.test_hook = Some(hook);
+    }
+
+    /// Runs until it is told to stop (then the last message is flagged so) or to open its link anew.
+    pub fn run(&mut self) -> Ended {
+        loop {
+            if self.shared.stop.load(Relaxed) {
+                self.stop();
+                return Ended::Stopped;
+            }
+            if self.shared.reopen.load(Relaxed) {
+                return Ended::Reopen;
+            }
+            self.turn();
+        }
+    }
+
+    /// Opens the link anew after the shared files were removed under it. Not real-time: nothing flows then anyway.
+    ///
+    /// # Errors
+    /// Any [`TransportError`] of opening; the old link is still in place then.
+    pub fn reopen(mut self, settings: &Settings) -> Result<Self, (Self, TransportError)> {
+        match Link::open(settings, self.waiting.wait) {
+            Ok(link) => {
+                self.link = link;
+                self.report(Event::Reopened);
+                self.shared.reopen.store(false, Relaxed);
+                Ok(self)
+            }
+            Err(error) => Err((self, error)),
+        }
+    }
+
+    /// One cycle: wait, take the newest state, answer it, publish, record.
+    pub fn turn(&mut self) {
+        let wanted_ns = self.wait();
+        let start_ns = now_ns();
+        let mut laps = Laps { last_ns: start_ns, features_ns: 0, inference_ns: 0 };
+        let accepted = self.cycle.counters().accepted;
+        self.take(start_ns);
+        let fresh = self.cycle.counters().accepted != accepted;
+        self.misses = if fresh { 0 } else { self.misses.saturating_add(1) };
+        if self.cycle.step(start_ns, &mut laps, &mut self.pose) {
+            self.run_test_hook();
+            let finish_ns = now_ns();
+            self.cycle.finish(finish_ns, false, &mut self.pose);
+            self.send();
+            if fresh {
+                self.record(start_ns, finish_ns, &laps);
+            }
+            self.report_changes(finish_ns - start_ns);
+        }
+        if let Some(wanted_ns) = wanted_ns {
+            self.recorder.record(Stage::Wakeup, start_ns - wanted_ns);
+        }
+        self.shared.show(self.cycle.counters(), &self.link_counters);
+        self.shared.heartbeat.fetch_add(1, Relaxed);
+        self.recorder.exchange();
+    }
+
+    /// Waits for a state, at most until the next period or until the newest state becomes stale. Returns the time at which the loop
+    /// wanted to wake, if it slept.
+    fn wait(&mut self) -> Option<i64> {
+        let now = now_ns();
+        let newest = self.cycle.newest().map(|state| state.source_time_ns.min(now));
+        let period = self.limits.period_ns;
+        let expected = newest.map_or(now + period, |source| source + period * ((now - source) / period + 1));
+        let stale = newest.map(|source| source + self.limits.stale_ns).filter(|&stale| stale > now).unwrap_or(i64::MAX);
+        match self.waiting.wait {
+            Wait::Spin => {
+                self.poll_until((now + period).min(stale));
+                None
+            }
+            Wait::Sleep => {
+                if self.misses > MISSES_MAX {
+                    sleep_until_ns(expected.min(stale));
+                    return Some(expected.min(stale));
+                }
+                let spin = self.waiting.spin_ns.min(period / 2);
+                let grace = spin.max(period / 4).min(period - spin - period / SLEEP_SHARE);
+                let wake = (expected - spin).max(now).min(stale);
+                sleep_until_ns(wake);
+                let woke = now_ns();
+                self.poll_until((expected + grace).min(stale));
+                if wake > now {
+                    self.recorder.record(Stage::Wakeup, woke - wake);
+                }
+                None
+            }
+            Wait::Event => {
+                let deadline = (expected + period / 2).min(stale);
+                let mut left = deadline - now;
+                while left > 0 && !self.waiting_state() {
+                    if let Some(listener) = &self.link.listener {
+                        listener.wait(Duration::from_nanos(left as u64));
+                    }
+                    left = deadline - now_ns();
+                    if left > 0 && self.shared.stop.load(Relaxed) {
+                        break;
+                    }
+                }
+                None
+            }
+        }
+    }
+
+    fn poll_until(&mut self, deadline_ns: i64) {
+        // Bounded by the deadline, which is at most one period away.
+        while !self.waiting_state() && now_ns() < deadline_ns {
+            std::hint::spin_loop();
+        }
+    }
+
+    fn waiting_state(&self) -> bool {
+        self.link.reader.has_message()
+    }
+
+    fn take(&mut self, now_ns: i64) {
+        let cycle = &mut self.cycle;
+        if self.link.reader.drain(|state| cycle.offer(state, now_ns)).is_err() {
+            self.link_counters.receive_failures += 1;
+        }
+    }
+
+    fn send(&mut self) {
+        if self.link.writer.send(&self.pose).is_err() {
+            self.link_counters.send_failures += 1;
+        }
+        self.shared.show_arms(&self.pose);
+    }
+
+    fn record(&mut self, start_ns: i64, finish_ns: i64, laps: &Laps) {
+        let sent_ns = now_ns();
+        let recorder = &mut self.recorder;
+        recorder.record(Stage::InputAge, start_ns - self.pose.source_time_ns);
+        recorder.record(Stage::Features, laps.features_ns);
+        recorder.record(Stage::Inference, laps.inference_ns);
+        recorder.record(Stage::Publish, sent_ns - finish_ns);
+        recorder.record(Stage::Total, sent_ns - start_ns);
+        recorder.record(Stage::InputToOutput, sent_ns - self.pose.source_time_ns);
+    }
+
+    /// The last message: flagged `stopping`, correction zero.
+    fn stop(&mut self) {
+        let now = now_ns();
+        self.take(now);
+        if self.cycle.stop(now, &mut self.pose) {
+            self.send();
+        }
+        self.shared.show(self.cycle.counters(), &self.link_counters);
+    }
+
+    /// Ends the loop and gives up its histograms for the last report.
+    pub fn into_recorder(self) -> Recorder {
+        self.recorder
+    }
+
+    fn run_test_hook(&mut self) {
+        let Some(hook) = &mut self.test_hook else { return };
+        if self.cycle.counters().published < hook.after || hook.turns == 0 {
+            return;
+        }
+        hook.turns -= 1;
+        let end = now_ns().saturating_add(hook.busy_ns);
+        while now_ns() < end {
+            std::hint::spin_loop();
+        }
+    }
+
+    fn report(&mut self, event: Event) {
+        if self.events.enqueue(event).is_err() {
+            self.link_counters.events_dropped += 1;
+        }
+    }
+
+    fn report_changes(&mut self, took_ns: i64) {
+        let counters = *self.cycle.counters();
+        let (id, sequence) = (self.pose.source_id, self.pose.source_sequence);
+        if self.seen.source_id != Some(id) {
+            self.seen.source_id = Some(id);
+            self.report(Event::Source { id, sequence });
+        }
+        for arm in 0..ARMS {
+            let (status, flags) = (self.pose.arm[arm].status, self.pose.arm[arm].flags);
+            let packed = u64::from(status) << 32 | u64::from(flags & FALLBACK_REASONS);
+            if packed != self.seen.arms[arm] {
+                self.seen.arms[arm] = packed;
+                self.report(Event::Arm { arm, status, flags, sequence });
+            }
+        }
+        if counters.lost != self.seen.lost {
+            self.seen.lost = counters.lost;
+            self.report(Event::Lost { total: counters.lost, sequence });
+        }
+        if counters.refused != self.seen.refused {
+            self.seen.refused = counters.refused;
+            self.report(Event::Refused { total: counters.refused });
+        }
+        if counters.late != self.seen.late {
+            self.seen.late = counters.late;
+            self.report(Event::Late { took_ns, sequence });
+        }
+        let failures = self.link_counters.receive_failures + self.link_counters.send_failures;
+        if failures != self.seen.link_failures {
+            self.seen.link_failures = failures;
+            let (receive, send) = (self.link_counters.receive_failures, self.link_counters.send_failures);
+            self.report(Event::Link { receive, send });
+        }
+    }
+}

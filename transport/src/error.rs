@@ -1,0 +1,82 @@
+//! What can go wrong when a link is opened or used.
+
+use thiserror::Error;
+
+/// Each message is one line that says what happened and what to do.
+#[derive(Debug, Error)]
+pub enum TransportError {
+    /// A prefix or root that cannot be a file name.
+    #[error("transport {what} {value:?} is not usable as a file name; use letters, digits, '_' and '-'")]
+    Settings {
+        /// `prefix` or `root`.
+        what: String,
+        /// As given.
+        value: String,
+    },
+    /// iceoryx2 could not make this process known.
+    #[error(
+        "shared memory under {root} cannot be used ({cause}); all parties must run as the same user, check the owner of {root} and of /dev/shm/{prefix}*"
+    )]
+    Node {
+        /// Root directory.
+        root: String,
+        /// Prefix of the files.
+        prefix: String,
+        /// iceoryx2's own name for the failure.
+        cause: String,
+    },
+    /// The service exists but is not ours.
+    #[error("service {service} exists with other contents than {expected} ({cause}); stop the program that made it, or update it")]
+    Foreign {
+        /// Service name.
+        service: &'static str,
+        /// Payload type name.
+        expected: &'static str,
+        /// iceoryx2's own name for the failure.
+        cause: String,
+    },
+    /// The service could not be opened.
+    #[error(
+        "service {service} cannot be opened ({cause}); all parties must have iceoryx2 {version} and run as the same user; if no party runs, remove /dev/shm/{prefix}*"
+    )]
+    Service {
+        /// Service name.
+        service: &'static str,
+        /// iceoryx2's own name for the failure.
+        cause: String,
+        /// The version of this build.
+        version: &'static str,
+        /// Prefix of the files.
+        prefix: String,
+    },
+    /// Another publisher or too many readers are alive.
+    #[error("service {service} has no free place for another {role} ({cause}); stop the one that runs")]
+    Full {
+        /// Service name.
+        service: &'static str,
+        /// `publisher` or `reader`.
+        role: &'static str,
+        /// iceoryx2's own name for the failure.
+        cause: String,
+    },
+    /// A loan was asked for while as many as allowed are out.
+    #[error("service {service}: no free message to write into ({cause}); send or drop the previous one first")]
+    Loan {
+        /// Service name.
+        service: &'static str,
+        /// iceoryx2's own name for the failure.
+        cause: &'static str,
+    },
+    /// A message could not be handed over to every reader.
+    #[error("service {service}: a reader could not be reached")]
+    Send {
+        /// Service name.
+        service: &'static str,
+    },
+    /// A publisher's memory could not be mapped.
+    #[error("service {service}: the memory of a publisher cannot be mapped")]
+    Receive {
+        /// Service name.
+        service: &'static str,
+    },
+}

@@ -1,0 +1,77 @@
+//! A bell beside `raven/state`, for the service's event mode: it costs the publisher one system call per message, so it is rung only
+//! where that is asked for.
+
+use crate::{Settings, TransportError};
+use iceoryx2::node::Node;
+use iceoryx2::prelude::{ServiceName, ipc};
+use ravenpose_wire::{ICEORYX2_VERSION, STATE_SERVICE};
+use std::time::Duration;
+
+type EventFactory = iceoryx2::service::port_factory::event::PortFactory<ipc::Service>;
+
+fn open(settings: &Settings) -> Result<(EventFactory, Node<ipc::Service>), TransportError> {
+    let unusable = |cause: String| TransportError::Service {
+        service: STATE_SERVICE,
+        cause,
+        version: ICEORYX2_VERSION,
+        prefix: settings.prefix.clone(),
+    };
+    let node = crate::link::node(settings)?;
+    let name = ServiceName::new(STATE_SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
+    let service = node.service_builder(&name).event().open_or_create().map_err(|cause| unusable(format!("{cause:?}")))?;
+    Ok((service, node))
+}
+
+/// Wakes the service after a state was sent.
+pub struct Bell {
+    notifier: iceoryx2::port::notifier::Notifier<ipc::Service>,
+    _opened: (EventFactory, Node<ipc::Service>),
+}
+
+impl Bell {
+    /// Opens the bell.
+    ///
+    /// # Errors
+    /// [`TransportError::Service`].
+    pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        let opened = open(settings)?;
+        let notifier = opened.0.notifier_builder().create().map_err(|cause| TransportError::Full {
+            service: STATE_SERVICE,
+            role: "notifier",
+            cause: format!("{cause:?}"),
+        })?;
+        Ok(Self { notifier, _opened: opened })
+    }
+
+    /// Rings; returns whether anybody listens. Never blocks.
+    pub fn ring(&self) -> bool {
+        self.notifier.notify().is_ok_and(|listeners| listeners > 0)
+    }
+}
+
+/// Waits for the bell.
+pub struct Listener {
+    listener: iceoryx2::port::listener::Listener<ipc::Service>,
+    _opened: (EventFactory, Node<ipc::Service>),
+}
+
+impl Listener {
+    /// Opens the listening end.
+    ///
+    /// # Errors
+    /// [`TransportError::Service`] or [`TransportError::Full`].
+    pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        let opened = open(settings)?;
+        let listener = opened.0.listener_builder().create().map_err(|cause| TransportError::Full {
+            service: STATE_SERVICE,
+            role: "listener",
+            cause: format!("{cause:?}"),
+        })?;
+        Ok(Self { listener, _opened: opened })
+    }
+
+    /// Waits for one ring, at most `timeout`; returns whether it rang.
+    pub fn wait(&self, timeout: Duration) -> bool {
+        matches!(self.listener.timed_wait_one(timeout), Ok(Some(_)))
+    }
+}

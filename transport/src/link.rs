@@ -1,0 +1,316 @@
+//! Publisher and reader of one message type.
+
+use crate::{Settings, TransportError, now_ns, sleep_until_ns};
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{BackpressureStrategy, ServiceName, SignalHandlingMode, ZeroCopySend, ipc};
+use iceoryx2::sample_mut_uninit::SampleMutUninit;
+use iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
+use iceoryx2::service::port_factory::PortFactory as _;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use ravenpose_wire::{CorrectedPose, ICEORYX2_VERSION, POSE_SERVICE, RavenState, STATE_SERVICE};
+use std::fmt::Debug;
+use std::mem::MaybeUninit;
+
+/// A message with its service.
+pub trait Message: ZeroCopySend + Copy + Debug + 'static {
+    /// Name of the service.
+    const SERVICE: &'static str;
+    /// Name of the payload type.
+    const TYPE: &'static str;
+    /// Readers that may be alive at once.
+    const MAX_READERS: usize;
+}
+
+impl Message for RavenState {
+    const SERVICE: &'static str = STATE_SERVICE;
+    const TYPE: &'static str = "RavenState.v1";
+    const MAX_READERS: usize = 16;
+}
+
+impl Message for CorrectedPose {
+    const SERVICE: &'static str = POSE_SERVICE;
+    const TYPE: &'static str = "CorrectedPose.v1";
+    const MAX_READERS: usize = 128;
+}
+
+/// Deepest queue that a reader may ask for: 64 ms of messages.
+const MAX_DEPTH: usize = 64;
+
+type Factory<T> = PortFactory<ipc::Service, T, ()>;
+
+struct Opened<T: Message> {
+    service: Factory<T>,
+    /// Keeps this process known to its peers; dropped after the ports.
+    _node: Node<ipc::Service>,
+}
+
+pub(crate) fn node(settings: &Settings) -> Result<Node<ipc::Service>, TransportError> {
+    // The library prints through no logger of its own here; errors travel as values.
+    iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
+    NodeBuilder::new()
+        .config(&settings.iceoryx2()?)
+        // Signals belong to the program, never to a library in the control process.
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(|cause| TransportError::Node {
+            root: settings.root.clone(),
+            prefix: settings.prefix.clone(),
+            cause: format!("{cause:?}"),
+        })
+}
+
+fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
+    let node = node(settings)?;
+    let unusable = |cause: String| TransportError::Service {
+        service: T::SERVICE,
+        cause,
+        version: ICEORYX2_VERSION,
+        prefix: settings.prefix.clone(),
+    };
+    let name = ServiceName::new(T::SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
+    let service = node
+        .service_builder(&name)
+        .publish_subscribe::<T>()
+        // Overflow drops the oldest: a slow reader never holds the writer up.
+        .enable_safe_overflow(true)
+        // A late reader gets the last message at once, and tells from its time how old it is.
+        .history_size(1)
+        .subscriber_max_buffer_size(MAX_DEPTH)
+        .subscriber_max_borrowed_samples(2)
+        .max_publishers(1)
+        .max_subscribers(T::MAX_READERS)
+        .max_nodes(T::MAX_READERS + 8)
+        .open_or_create()
+        .map_err(|cause| match cause {
+            PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+                PublishSubscribeOpenError::IncompatibleTypes
+                | PublishSubscribeOpenError::IncompatibleMessagingPattern
+                | PublishSubscribeOpenError::IncompatibleAttributes
+                | PublishSubscribeOpenError::IncompatibleOverflowBehavior
+                | PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize
+                | PublishSubscribeOpenError::DoesNotSupportRequestedMinHistorySize
+                | PublishSubscribeOpenError::DoesNotSupportRequestedMinSubscriberBorrowedSamples
+                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfPublishers
+                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfSubscribers
+                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfNodes,
+            ) => TransportError::Foreign { service: T::SERVICE, expected: T::TYPE, cause: format!("{cause:?}") },
+            _ => unusable(format!("{cause:?}")),
+        })?;
+    Ok(Opened { service, _node: node })
+}
+
+/// The one publisher of a message type.
+pub struct Writer<T: Message> {
+    publisher: Publisher<ipc::Service, T, ()>,
+    opened: Opened<T>,
+}
+
+impl<T: Message> Writer<T> {
+    /// Opens the service and takes its one publisher's place.
+    ///
+    /// # Errors
+    /// Any [`TransportError`] of opening; [`TransportError::Full`] while another publisher is alive.
+    pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        let opened = open::<T>(settings)?;
+        let publisher = opened
+            .service
+            .publisher_builder()
+            .max_loaned_samples(2)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|cause| match cause {
+                PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                    TransportError::Full { service: T::SERVICE, role: "publisher", cause: format!("{cause:?}") }
+                }
+                _ => TransportError::Service {
+                    service: T::SERVICE,
+                    cause: format!("{cause:?}"),
+                    version: ICEORYX2_VERSION,
+                    prefix: settings.prefix.clone(),
+                },
+            })?;
+        Ok(Self { publisher, opened })
+    }
+
+    /// Takes a free message to write into. Nothing is visible to anybody before [`Loan::send`].
+    ///
+    /// # Errors
+    /// [`TransportError::Loan`] while two loans are out.
+    pub fn loan(&self) -> Result<Loan<T>, TransportError> {
+        self.publisher
+            .loan_uninit()
+            .map(|sample| Loan { sample })
+            .map_err(|_| TransportError::Loan { service: T::SERVICE, cause: "all loans are out" })
+    }
+
+    /// Copies a message and hands it over; returns the number of readers that got it.
+    ///
+    /// # Errors
+    /// As [`Writer::loan`] and [`Loan::send`].
+    pub fn send(&self, message: &T) -> Result<usize, TransportError> {
+        self.loan()?.send(message)
+    }
+
+    /// Readers connected now.
+    pub fn readers(&self) -> usize {
+        self.opened.service.dynamic_config().number_of_subscribers()
+    }
+}
+
+/// A message being written.
+pub struct Loan<T: Message> {
+    sample: SampleMutUninit<ipc::Service, MaybeUninit<T>, ()>,
+}
+
+impl<T: Message> Loan<T> {
+    /// Where the message will lie; uninitialised.
+    pub fn as_mut_ptr(&mut self) -> *mut T {
+        self.sample.payload_mut().as_mut_ptr()
+    }
+
+    /// Writes `message` and hands it over; returns the number of readers that got it.
+    ///
+    /// # Errors
+    /// [`TransportError::Send`].
+    pub fn send(self, message: &T) -> Result<usize, TransportError> {
+        self.sample.write_payload(*message).send().map_err(|_| TransportError::Send { service: T::SERVICE })
+    }
+
+    /// Hands over what was written through [`Loan::as_mut_ptr`].
+    ///
+    /// # Errors
+    /// [`TransportError::Send`].
+    ///
+    /// # Safety
+    /// The whole message must have been initialised through [`Loan::as_mut_ptr`].
+    pub unsafe fn send_written(self) -> Result<usize, TransportError> {
+        // SAFETY: the caller promises that the payload is initialised.
+        let sample = unsafe { self.sample.assume_init() };
+        sample.send().map_err(|_| TransportError::Send { service: T::SERVICE })
+    }
+}
+
+/// A reader of a message type.
+pub struct Reader<T: Message> {
+    subscriber: Subscriber<ipc::Service, T, ()>,
+    opened: Opened<T>,
+    depth: usize,
+}
+
+impl<T: Message> Reader<T> {
+    /// Opens the service with a queue of `depth` messages (1 to 64); the oldest is dropped when it is full.
+    ///
+    /// # Errors
+    /// Any [`TransportError`] of opening; [`TransportError::Full`] when all places are taken.
+    pub fn open(settings: &Settings, depth: usize) -> Result<Self, TransportError> {
+        let opened = open::<T>(settings)?;
+        let depth = depth.clamp(1, MAX_DEPTH);
+        let subscriber = opened.service.subscriber_builder().buffer_size(depth).create().map_err(|cause| TransportError::Full {
+            service: T::SERVICE,
+            role: "reader",
+            cause: format!("{cause:?}"),
+        })?;
+        Ok(Self { subscriber, opened, depth })
+    }
+
+    /// Gives every waiting message to `take`, oldest first, at most the queue's depth of them; returns how many.
+    ///
+    /// # Errors
+    /// [`TransportError::Receive`] when a new publisher's memory cannot be mapped; what came before was taken.
+    pub fn drain(&self, mut take: impl FnMut(&T)) -> Result<usize, TransportError> {
+        for count in 0..self.depth {
+            match self.subscriber.receive() {
+                Ok(Some(sample)) => take(sample.payload()),
+                Ok(None) => return Ok(count),
+                Err(_) => return Err(TransportError::Receive { service: T::SERVICE }),
+            }
+        }
+        Ok(self.depth)
+    }
+
+    /// Is a message waiting? Also `true` when looking failed: then taking it tells why.
+    pub fn has_message(&self) -> bool {
+        self.subscriber.has_samples().unwrap_or(true)
+    }
+
+    /// The oldest waiting message, if any.
+    ///
+    /// # Errors
+    /// As [`Reader::drain`].
+    pub fn next(&self) -> Result<Option<T>, TransportError> {
+        match self.subscriber.receive() {
+            Ok(sample) => Ok(sample.map(|sample| *sample.payload())),
+            Err(_) => Err(TransportError::Receive { service: T::SERVICE }),
+        }
+    }
+
+    /// The newest waiting message, if any; older ones are dropped.
+    ///
+    /// # Errors
+    /// As [`Reader::drain`].
+    pub fn latest(&self) -> Result<Option<T>, TransportError> {
+        let mut newest = None;
+        self.drain(|message| newest = Some(*message))?;
+        Ok(newest)
+    }
+
+    /// Waits until `ready` accepts a result of `take`, polling every `poll_ns` (0: without a pause), until `deadline_ns`.
+    ///
+    /// # Errors
+    /// As [`Reader::drain`].
+    pub fn wait<R>(
+        &self,
+        deadline_ns: i64,
+        poll_ns: i64,
+        mut take: impl FnMut(&Self) -> Result<Option<R>, TransportError>,
+    ) -> Result<Option<R>, TransportError> {
+        loop {
+            if let Some(result) = take(self)? {
+                return Ok(Some(result));
+            }
+            let now = now_ns();
+            if now >= deadline_ns {
+                return Ok(None);
+            }
+            if poll_ns > 0 {
+                sleep_until_ns((now + poll_ns).min(deadline_ns));
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+    }
+
+    /// Publishers connected now.
+    pub fn publishers(&self) -> usize {
+        self.opened.service.dynamic_config().number_of_publishers()
+    }
+}
+
+/// Looks at the services as a newcomer finds them, from another thread than the ports'.
+///
+/// After the shared files were removed under running processes, old peers go on talking among themselves while newcomers make a
+/// new service: nothing tells the old ones. A port that a newcomer cannot see must be opened anew.
+pub struct Probe {
+    node: Node<ipc::Service>,
+}
+
+impl Probe {
+    /// Joins as a node without ports.
+    ///
+    /// # Errors
+    /// [`TransportError::Node`].
+    pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        node(settings).map(|node| Self { node })
+    }
+
+    /// Publishers and readers that a newcomer finds; zeros where there is no such service.
+    pub fn count<T: Message>(&self) -> (usize, usize) {
+        let Ok(name) = ServiceName::new(T::SERVICE) else { return (0, 0) };
+        self.node.service_builder(&name).publish_subscribe::<T>().open().map_or((0, 0), |service| {
+            let peers = service.dynamic_config();
+            (peers.number_of_publishers(), peers.number_of_subscribers())
+        })
+    }
+}
