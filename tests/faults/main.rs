@@ -1,0 +1,7 @@
+//! The faults of the specification against the pure cycle: each row alone (`rows`), and random mixes of them (`mix`).
+
+#[path = "../common/mod.rs"]
+mod common;
+mod mix;
+mod rows;
+mod world;

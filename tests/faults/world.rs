@@ -1,0 +1,131 @@
+//! A plausible robot for the pure cycle: states that move within all limits, and an estimator with faults on demand.
+
+use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::guard::Guard;
+use ravenpose_wire::{CorrectedPose, FEATURES, RavenState};
+
+pub const MS: i64 = 1_000_000;
+/// `dac_val` of joint slot 0 that makes the estimator misbehave.
+pub const OUT_NAN: i32 = 771;
+pub const OUT_INFINITE: i32 = 772;
+pub const OUT_HUGE: i32 = 773;
+/// Largest correction of the test model, µm.
+pub const BOUND_UM: f64 = 8_000.0;
+
+/// A state of both arms at sample `step`, sent at `time_ns`.
+pub fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> RavenState {
+    let mut state = RavenState::new();
+    let t = step as f64 * 1e-3;
+    state.source_id = source;
+    state.source_time_ns = time_ns;
+    state.arms = 3;
+    state.runlevel = 3;
+    state.type_ = [49, 22];
+    state.dt_nsec = 1_000_000;
+    for arm in 0..2 {
+        let s = (t * (1.0 + arm as f64)).sin();
+        for axis in 0..3 {
+            state.pos[arm * 3 + axis] = (20_000.0 * s + 1000.0 * axis as f64) as i32;
+            state.ori[arm * 9 + axis * 4] = 1.0;
+        }
+        let at = arm * 8;
+        state.jpos[at] = 30.0 + 10.0 * s as f32;
+        state.jpos[at + 1] = 90.0;
+        state.jpos[at + 2] = 22.9;
+        state.jpos_d[at..at + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
+        for slot in [0, 1, 2, 4, 5, 6, 7] {
+            // Steadily moving encoders: one count per cycle at least.
+            state.enc_vals[at + slot] = (step as i32 % 100_000) * (1 + slot as i32);
+            state.mpos[at + slot] = state.enc_vals[at + slot] as f32 * 0.09;
+        }
+    }
+    state.seal(sequence);
+    state
+}
+
+/// Smooth and bounded in the state, with faults on demand; counts its runs.
+#[derive(Default)]
+pub struct Fake {
+    pub runs: u64,
+}
+
+impl Estimator for Fake {
+    fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+        self.runs += 1;
+        let x = features[0] / 10_000.0;
+        *error_mm = [2.0 * x.sin(), 1.5 * x.cos(), 0.5];
+        match features[32] as i32 {
+            OUT_NAN => error_mm[1] = f32::NAN,
+            OUT_INFINITE => error_mm[2] = f32::INFINITY,
+            OUT_HUGE => error_mm[0] = 8.5,
+            _ => {}
+        }
+    }
+}
+
+pub fn model() -> ArmModel<Fake> {
+    ArmModel::Loaded(Box::new(Model {
+        estimator: Fake::default(),
+        guard: Guard::new(None),
+        id: 0x0123_4567_89ab_cdef,
+        bound_um: BOUND_UM,
+        bound95_um: [300.0, 400.0, 500.0],
+        untrained: false,
+    }))
+}
+
+pub fn cycle(limits: Limits) -> Cycle<Fake> {
+    Cycle::new(limits, [model(), model()], false, 0)
+}
+
+/// The pure cycle with a clock in its hand: one call per period.
+pub struct Bench {
+    pub cycle: Cycle<Fake>,
+    pub pose: CorrectedPose,
+    pub now: i64,
+    pub step: u64,
+    /// Time that the next cycle takes.
+    pub took: i64,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self { cycle: cycle(Limits::default()), pose: CorrectedPose::new(), now: 1_000 * MS, step: 0, took: 40_000 }
+    }
+
+    /// The next regular state, with sequence number = step.
+    pub fn next_state(&mut self) -> RavenState {
+        self.now += MS;
+        self.step += 1;
+        state(7, self.step, self.step, self.now)
+    }
+
+    /// Offers `messages` and runs one cycle; returns the pose if one is published.
+    pub fn run(&mut self, messages: &[RavenState]) -> Option<CorrectedPose> {
+        for message in messages {
+            self.cycle.offer(message, self.now);
+        }
+        if !self.cycle.step(self.now, &mut (), &mut self.pose) {
+            return None;
+        }
+        self.cycle.finish(self.now + self.took, false, &mut self.pose);
+        Some(self.pose)
+    }
+
+    /// One regular cycle.
+    pub fn good(&mut self) -> CorrectedPose {
+        let state = self.next_state();
+        self.run(&[state]).expect("a fresh state is answered")
+    }
+
+    /// Good cycles until the correction is complete.
+    pub fn settle(&mut self) -> CorrectedPose {
+        for _ in 0..2000 {
+            let pose = self.good();
+            if pose.arm.iter().all(|arm| arm.status == 2 && arm.flags == 0) {
+                return pose;
+            }
+        }
+        panic!("never valid: {:?}", self.pose.arm);
+    }
+}
