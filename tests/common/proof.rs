@@ -1,0 +1,102 @@
+//! Proof tools: an allocator that counts, a system-call filter that kills, and a thread's page faults.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+thread_local! {
+    static ARMED: Cell<bool> = const { Cell::new(false) };
+}
+static CALLS: AtomicU64 = AtomicU64::new(0);
+
+/// Counts allocations, reallocations and frees of armed threads.
+pub struct Counting;
+
+fn note() {
+    if ARMED.get() {
+        CALLS.fetch_add(1, Relaxed);
+    }
+}
+
+// SAFETY: every call is passed on unchanged to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        note();
+        // SAFETY: the caller's layout.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        note();
+        // SAFETY: the caller's layout.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        note();
+        // SAFETY: the caller's block.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        note();
+        // SAFETY: the caller's block.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Runs `body` and returns how often it called the allocator on this thread.
+pub fn allocator_calls(body: impl FnOnce()) -> u64 {
+    let before = CALLS.load(Relaxed);
+    ARMED.set(true);
+    body();
+    ARMED.set(false);
+    CALLS.load(Relaxed) - before
+}
+
+/// Minor and major faults of a thread of this process, from /proc.
+pub fn faults_of(thread: i32) -> (u64, u64) {
+    let stat = std::fs::read_to_string(format!("/proc/self/task/{thread}/stat")).expect("stat of the thread");
+    let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
+    (fields[7].parse().expect("minflt"), fields[9].parse().expect("majflt"))
+}
+
+pub fn thread_id() -> i32 {
+    // SAFETY: no arguments, no memory.
+    unsafe { libc::syscall(libc::SYS_gettid) as i32 }
+}
+
+/// From now on any system call of this thread but `allowed` kills the process. There is no way back.
+pub fn forbid_system_calls_but(allowed: &[i64]) {
+    let statement = |code: u32, k: u32| libc::sock_filter { code: code as u16, jt: 0, jf: 0, k };
+    let mut program = vec![statement(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0)];
+    for (at, number) in allowed.iter().enumerate() {
+        // To the last statement, which allows.
+        let jt = (allowed.len() - at) as u8;
+        program.push(libc::sock_filter {
+            code: (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16,
+            jt,
+            jf: 0,
+            k: *number as u32,
+        });
+    }
+    program.push(statement(libc::BPF_RET | libc::BPF_K, libc::SECCOMP_RET_KILL_PROCESS));
+    program.push(statement(libc::BPF_RET | libc::BPF_K, libc::SECCOMP_RET_ALLOW));
+    let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
+    // SAFETY: `filter` and the program it points to live through both calls.
+    let refused = unsafe {
+        libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0
+            || libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter) != 0
+    };
+    assert!(!refused, "the filter is in place");
+}
+
+/// Runs this test again as a process of its own, with `ROLE` in its environment, and gives its outcome.
+pub fn in_child(test: &str, role: &str) -> std::process::Output {
+    std::process::Command::new(std::env::current_exe().expect("this program"))
+        .args([test, "--exact", "--nocapture", "--test-threads=1"])
+        .env("RAVENPOSE_TEST_ROLE", role)
+        .output()
+        .expect("the child runs")
+}
+
+pub fn role() -> Option<String> {
+    std::env::var("RAVENPOSE_TEST_ROLE").ok()
+}

@@ -1,0 +1,241 @@
+//! The loop's promises, proven on the real runner over real shared memory: no allocation, no page fault, no system call but the
+//! waiting one, over a million free-running turns and over a minute at 1 kHz.
+
+mod common;
+#[path = "common/proof.rs"]
+mod proof;
+
+use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, in_child, role, thread_id};
+use ravenpose::config::{ModelSource, Wait};
+use ravenpose::cycle::{ArmModel, Cycle, Limits};
+use ravenpose::network::Plan;
+use ravenpose::runner::{Runner, Waiting};
+use ravenpose::shared::Shared;
+use ravenpose::{histogram, model, realtime, shared};
+use ravenpose_transport::{Reader, Settings, Writer, now_ns, sleep_until_ns};
+use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering::SeqCst};
+use std::time::Duration;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const TURNS: u64 = 1_000_000;
+const WARM_UP: u64 = 5_000;
+
+fn settings(name: &str) -> Settings {
+    Settings { prefix: format!("{name}{}_", std::process::id()), ..Settings::default() }
+}
+
+fn untrained() -> ArmModel<Plan> {
+    let source = ModelSource { path: common::untrained(), sha256: None };
+    let (model, _) = model::load(&source).expect("the repository's model");
+    ArmModel::Loaded(Box::new(model))
+}
+
+fn runner(settings: &Settings, wait: Wait) -> (Runner<Plan>, histogram::Collector, shared::EventReceiver, Arc<Shared>) {
+    let limits = Limits::default();
+    let cycle = Cycle::new(limits, [untrained(), untrained()], true, 0);
+    let (recorder, collector) = histogram::exchange();
+    let (sender, events) = shared::events();
+    let shown = Arc::new(Shared::default());
+    let waiting = Waiting { wait, spin_ns: 200_000 };
+    let runner = Runner::open(settings, cycle, limits, waiting, (recorder, sender, shown.clone())).expect("link");
+    (runner, collector, events, shown)
+}
+
+/// A state of both arms inside the domain of the untrained model.
+fn state(sequence: u64) -> RavenState {
+    let mut state = RavenState::new();
+    state.arms = 3;
+    state.runlevel = 3;
+    state.type_ = [49, 22];
+    state.dt_nsec = 1_000_000;
+    for arm in 0..2 {
+        state.pos[arm * 3] = (sequence % 1000) as i32;
+        state.jpos[arm * 8..arm * 8 + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
+        state.jpos_d[arm * 8..arm * 8 + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
+        state.enc_vals[arm * 8] = (sequence % 1000) as i32;
+    }
+    state.source_id = 1;
+    state.source_time_ns = now_ns();
+    state.seal(sequence);
+    state
+}
+
+/// Every tenth thousand turn has a fault, so that fallback paths are proven too.
+fn faulty(sequence: u64) -> RavenState {
+    let mut state = state(sequence);
+    match sequence % 10_000 {
+        0 => state.tau[0] = f32::NAN,
+        2_500 => state.pos[3] = 9_000_000,
+        5_000 => state.guard_tail ^= 1,
+        7_500 => state.source_time_ns -= 50_000_000,
+        _ => {}
+    }
+    state
+}
+
+#[test]
+fn a_million_turns_allocate_nothing_fault_nothing_and_call_nothing() {
+    if role().as_deref() == Some("million") {
+        million();
+    }
+    let output = in_child("a_million_turns_allocate_nothing_fault_nothing_and_call_nothing", "million");
+    let text = String::from_utf8_lossy(&output.stdout);
+    println!("{text}");
+    assert!(
+        output.status.success(),
+        "{:?} (a signal means a forbidden system call)\n{}",
+        output.status,
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(text.contains("turns 1000000 allocator calls 0 minor faults 0 major faults 0"), "{text}");
+}
+
+/// In a process of its own: one thread turns the loop under a filter that kills at the first system call; this one watches.
+fn million() -> ! {
+    static THREAD: AtomicI32 = AtomicI32::new(0);
+    static GO: AtomicBool = AtomicBool::new(false);
+    static DONE: AtomicBool = AtomicBool::new(false);
+    static CALLS: AtomicU64 = AtomicU64::new(u64::MAX);
+    static VALID: AtomicU64 = AtomicU64::new(0);
+    realtime::lock_memory().expect("memory is locked");
+    let (finish, finished) = std::sync::mpsc::channel::<()>();
+    std::thread::spawn(move || {
+        let settings = settings("mil");
+        let (mut runner, _collector, _events, _) = runner(&settings, Wait::Spin);
+        let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
+        let reader: Reader<CorrectedPose> = Reader::open(&settings, 64).expect("reader");
+        let mut sequence = 0;
+        let mut turns = |count: u64| {
+            for _ in 0..count {
+                sequence += 1;
+                writer.send(&faulty(sequence)).expect("state sent");
+                runner.turn();
+                while let Some(pose) = reader.next().expect("pose read") {
+                    if pose.arm[0].status == ArmStatus::Valid as u32 {
+                        VALID.fetch_add(1, SeqCst);
+                    }
+                }
+            }
+        };
+        turns(WARM_UP);
+        THREAD.store(thread_id(), SeqCst);
+        while !GO.load(SeqCst) {
+            std::hint::spin_loop();
+        }
+        forbid_system_calls_but(&[]);
+        CALLS.store(allocator_calls(|| turns(TURNS)), SeqCst);
+        DONE.store(true, SeqCst);
+        // No way out of the filter: stay here until the process ends.
+        loop {
+            std::hint::spin_loop();
+            if false {
+                let _ = finish.send(());
+            }
+        }
+    });
+    while THREAD.load(SeqCst) == 0 {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let before = faults_of(THREAD.load(SeqCst));
+    GO.store(true, SeqCst);
+    let _ = &finished;
+    while !DONE.load(SeqCst) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let after = faults_of(THREAD.load(SeqCst));
+    assert!(VALID.load(SeqCst) > TURNS / 2, "the network ran: {} valid", VALID.load(SeqCst));
+    println!(
+        "turns {TURNS} allocator calls {} minor faults {} major faults {}",
+        CALLS.load(SeqCst),
+        after.0 - before.0,
+        after.1 - before.1
+    );
+    std::process::exit(0);
+}
+
+#[test]
+fn a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps() {
+    if role().as_deref() == Some("minute") {
+        minute();
+    }
+    let output = in_child("a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps", "minute");
+    let text = String::from_utf8_lossy(&output.stdout);
+    println!("{text}");
+    assert!(output.status.success(), "{:?}\n{}", output.status, String::from_utf8_lossy(&output.stderr));
+    if text.contains("skipped:") {
+        return;
+    }
+    assert!(text.contains("allocator calls 0 minor faults 0 major faults 0"), "{text}");
+}
+
+fn minute() -> ! {
+    static THREAD: AtomicI32 = AtomicI32::new(0);
+    static DONE: AtomicBool = AtomicBool::new(false);
+    static CALLS: AtomicU64 = AtomicU64::new(u64::MAX);
+    const SECONDS: u64 = 60;
+    const CORE: usize = 1;
+    realtime::lock_memory().expect("memory is locked");
+    let settings = settings("min");
+    let (ready, opened) = std::sync::mpsc::channel();
+    let link = settings.clone();
+    std::thread::spawn(move || {
+        let (mut runner, collector, _events, shown) = runner(&link, Wait::Sleep);
+        if let Err(missing) = realtime::pin(CORE).and_then(|()| realtime::set_fifo(80)) {
+            println!("skipped: {missing}");
+            std::process::exit(0);
+        }
+        assert_eq!(realtime::scheduling(), (libc::SCHED_FIFO, 80, vec![CORE]), "policy, priority and core of the loop's thread");
+        ready.send((shown, collector)).expect("the test waits");
+        for _ in 0..3_000 {
+            runner.turn();
+        }
+        THREAD.store(thread_id(), SeqCst);
+        forbid_system_calls_but(&[libc::SYS_clock_nanosleep]);
+        let calls = allocator_calls(|| {
+            for _ in 0..(SECONDS * 1000) {
+                runner.turn();
+            }
+        });
+        CALLS.store(calls, SeqCst);
+        DONE.store(true, SeqCst);
+        loop {
+            sleep_until_ns(now_ns() + 1_000_000_000);
+        }
+    });
+    let (shown, mut collector) = opened.recv().expect("the loop runs");
+    let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
+    let mut next = now_ns();
+    let mut before = None;
+    let mut sequence = 0;
+    let mut measured = histogram::Histograms::new();
+    while !DONE.load(SeqCst) {
+        sequence += 1;
+        writer.send(&state(sequence)).expect("state sent");
+        if before.is_none() && THREAD.load(SeqCst) != 0 {
+            before = Some((faults_of(THREAD.load(SeqCst)), shown.counters()));
+        }
+        if sequence % 1000 == 0 {
+            collector.collect(|set| measured.add(set));
+        }
+        next = (next + 1_000_000).max(now_ns() - 1_000_000);
+        sleep_until_ns(next);
+    }
+    let after = faults_of(THREAD.load(SeqCst));
+    let (before, counters_before) = before.expect("the loop warmed up");
+    let accepted = shown.counters()[1] - counters_before[1];
+    assert!(accepted > SECONDS * 1000 * 9 / 10, "states came: {accepted}");
+    let age = measured.stage(histogram::Stage::InputToOutput);
+    println!(
+        "{SECONDS} s at 1 kHz: states {accepted} allocator calls {} minor faults {} major faults {}; input to output p50 {:.1} us p99.9 {:.1} us",
+        CALLS.load(SeqCst),
+        after.0 - before.0,
+        after.1 - before.1,
+        age.value_at_quantile(0.5) as f64 / 1e3,
+        age.value_at_quantile(0.999) as f64 / 1e3
+    );
+    std::process::exit(0);
+}
