@@ -27,6 +27,7 @@ offline: build
 
 # Into a folder of our own, as a user would install it.
 stage: build
+	@mkdir -p $(BUILD)
 	$(MAKE) --no-print-directory install PREFIX=$(STAGE) DESTDIR=
 
 install:
@@ -50,6 +51,10 @@ examples: stage
 	  $(CC) -std=c99 $(CFLAGS_STRICT) -I$(STAGE)/include $$f -o $(STAGE)/bin/$$(basename $$f .c) -L$(STAGE)/lib -lravenpose_bridge $(RPATH) || exit 1; done
 	for f in bridge/examples/cxx/*.cpp; do \
 	  $(CXX) -std=c++17 $(CFLAGS_STRICT) -I$(STAGE)/include $$f -o $(STAGE)/bin/$$(basename $$f .cpp) -L$(STAGE)/lib -lravenpose_bridge $(RPATH) || exit 1; done
+
+# RUN=FILE plays a recording of your own.
+demo: offline examples
+	bridge/examples/demo.sh $(RUN)
 
 clean:
 	rm -rf $(BUILD) target

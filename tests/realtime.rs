@@ -24,10 +24,6 @@ static ALLOCATOR: Counting = Counting;
 const TURNS: u64 = 1_000_000;
 const WARM_UP: u64 = 5_000;
 
-fn settings(name: &str) -> Settings {
-    Settings { prefix: format!("{name}{}_", std::process::id()), ..Settings::default() }
-}
-
 fn untrained() -> ArmModel<Plan> {
     let source = ModelSource { path: common::untrained(), sha256: None };
     let (model, _) = model::load(&source).expect("the repository's model");
@@ -104,7 +100,7 @@ fn million() -> ! {
     realtime::lock_memory().expect("memory is locked");
     let (finish, finished) = std::sync::mpsc::channel::<()>();
     std::thread::spawn(move || {
-        let settings = settings("mil");
+        let settings = Settings::from_env();
         let (mut runner, _collector, _events, _) = runner(&settings, Wait::Spin);
         let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
         let reader: Reader<CorrectedPose> = Reader::open(&settings, 64).expect("reader");
@@ -179,7 +175,7 @@ fn minute() -> ! {
     const SECONDS: u64 = 60;
     const CORE: usize = 1;
     realtime::lock_memory().expect("memory is locked");
-    let settings = settings("min");
+    let settings = Settings::from_env();
     let (ready, opened) = std::sync::mpsc::channel();
     let link = settings.clone();
     std::thread::spawn(move || {

@@ -67,3 +67,27 @@ impl Rng {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
+
+/// Removes every shared file with a prefix: those under /dev/shm and iceoryx2's own.
+pub fn remove_shared_memory(prefix: &str) {
+    for dir in ["/dev/shm", "/tmp/iceoryx2/nodes", "/tmp/iceoryx2/services"] {
+        for path in shared_files_in(dir, prefix) {
+            let _ = std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir_all(&path));
+        }
+    }
+}
+
+/// The shared files with a prefix under /dev/shm.
+pub fn shared_files(prefix: &str) -> Vec<PathBuf> {
+    shared_files_in("/dev/shm", prefix)
+}
+
+fn shared_files_in(dir: &str, prefix: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(dir) else { return Vec::new() };
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(prefix)))
+        .collect();
+    found.sort();
+    found
+}

@@ -1,4 +1,5 @@
 //! Proof tools: an allocator that counts, a system-call filter that kills, and a thread's page faults.
+#![allow(unreachable_pub)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -88,13 +89,18 @@ pub fn forbid_system_calls_but(allowed: &[i64]) {
     assert!(!refused, "the filter is in place");
 }
 
-/// Runs this test again as a process of its own, with `ROLE` in its environment, and gives its outcome.
+/// Runs this test again as a process of its own, with `ROLE` in its environment, and gives its outcome. The child ends without
+/// leaving its shared memory in order (it cannot, under the filter), so that is removed here.
 pub fn in_child(test: &str, role: &str) -> std::process::Output {
-    std::process::Command::new(std::env::current_exe().expect("this program"))
+    let prefix = format!("rp{role}{}_", std::process::id());
+    let output = std::process::Command::new(std::env::current_exe().expect("this program"))
         .args([test, "--exact", "--nocapture", "--test-threads=1"])
         .env("RAVENPOSE_TEST_ROLE", role)
+        .env("RAVENPOSE_PREFIX", &prefix)
         .output()
-        .expect("the child runs")
+        .expect("the child runs");
+    super::common::remove_shared_memory(&prefix);
+    output
 }
 
 pub fn role() -> Option<String> {

@@ -1,0 +1,48 @@
+//! Tables of measurements.
+
+use std::fmt;
+
+/// Median, 99 %, 99.9 % and largest, in µs, of times in ns; sorts them.
+pub(crate) fn quantiles(times_ns: &mut [i64]) -> [f64; 4] {
+    times_ns.sort_unstable();
+    let at = |q: f64| {
+        let index = ((times_ns.len() as f64 * q) as usize).min(times_ns.len().saturating_sub(1));
+        times_ns.get(index).map_or(f64::NAN, |&ns| ns as f64 / 1000.0)
+    };
+    [at(0.5), at(0.99), at(0.999), at(1.0)]
+}
+
+/// A table with one heading, named rows and numbers.
+pub(crate) struct Table {
+    title: String,
+    columns: Vec<String>,
+    rows: Vec<(String, Vec<f64>)>,
+}
+
+impl Table {
+    pub(crate) fn new(title: &str, columns: &[&str]) -> Self {
+        Self { title: title.to_owned(), columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
+    }
+
+    pub(crate) fn row(&mut self, name: &str, values: &[f64]) {
+        self.rows.push((name.to_owned(), values.to_vec()));
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:58}", self.title)?;
+        for column in &self.columns {
+            write!(f, " {column:>9}")?;
+        }
+        writeln!(f)?;
+        for (name, values) in &self.rows {
+            write!(f, "  {name:56}")?;
+            for value in values {
+                if value.is_nan() { write!(f, " {:>9}", "-")? } else { write!(f, " {value:9.2}")? }
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,99 @@
+//! `ravenpose stats`: what the running service has measured, read from its `stats.json`.
+
+use crate::output;
+use ravenpose::report::{self, STATS_VERSION, Stats};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, SystemTime};
+
+/// Older statistics mean that the service does not run.
+const AGE_MAX_S: u64 = 5;
+
+pub(crate) fn run(runtime_dir: &Path, watch: bool, hgrm: Option<&Path>) -> Result<ExitCode, String> {
+    let path = runtime_dir.join("stats.json");
+    if let Some(hgrm) = hgrm {
+        write_hgrm(&read(&path)?, hgrm)?;
+    }
+    loop {
+        let stats = read(&path)?;
+        if watch {
+            // Home, draw, clear what is below: no flicker.
+            print!("\x1b[H{}\x1b[J", table(&stats).replace('\n', "\x1b[K\n"));
+            let _ = std::io::Write::flush(&mut std::io::stdout());
+            std::thread::sleep(Duration::from_secs(1));
+        } else {
+            print!("{}", table(&stats));
+            return Ok(ExitCode::SUCCESS);
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Stats, String> {
+    let text = std::fs::read(path).map_err(|cause| {
+        format!("{}: {cause}; is ravenposed running? give its report.runtime_dir with --runtime-dir", path.display())
+    })?;
+    let stats: Stats = serde_json::from_slice(&text).map_err(|cause| {
+        format!("{}: not statistics of this version ({cause}); use the ravenpose of the service", path.display())
+    })?;
+    if stats.version != STATS_VERSION {
+        return Err(format!(
+            "{}: statistics of version {}, this program reads {STATS_VERSION}; use the ravenpose of the service",
+            path.display(),
+            stats.version
+        ));
+    }
+    Ok(stats)
+}
+
+fn table(stats: &Stats) -> String {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let age = now.saturating_sub(stats.written_unix_s);
+    let mut text = String::new();
+    let state = if age > AGE_MAX_S { format!("NOT RUNNING: last statistics {age} s ago") } else { "running".to_owned() };
+    let _ = writeln!(text, "ravenposed {state}, pid {}, up {} s", stats.pid, stats.uptime_s);
+    for arm in &stats.arms {
+        let model = if arm.model.is_empty() { "no model" } else { &arm.model };
+        let _ = writeln!(text, "  {:5} {:9} {:40} {model}", arm.arm, arm.status, arm.flags.join(" "));
+    }
+    let _ = writeln!(
+        text,
+        "\n  {:18} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "latency, us", "count", "min", "p50", "p99", "p99.9", "max"
+    );
+    for stage in &stats.stages {
+        let us = |ns: u64| ns as f64 / 1000.0;
+        let _ = writeln!(
+            text,
+            "  {:18} {:>10} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>9.2}",
+            stage.name,
+            stage.count,
+            us(stage.min),
+            us(stage.p50),
+            us(stage.p99),
+            us(stage.p999),
+            us(stage.max)
+        );
+    }
+    let _ = writeln!(text);
+    for row in stats.counters.chunks(4) {
+        for counter in row {
+            let _ = write!(text, "  {:17} {:>10}", counter.name, counter.value);
+        }
+        let _ = writeln!(text);
+    }
+    text
+}
+
+fn write_hgrm(stats: &Stats, hgrm: &Path) -> Result<(), String> {
+    let extension = hgrm.extension().map_or_else(|| "hgrm".into(), |e| e.to_string_lossy().into_owned());
+    let stem = hgrm.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    for stage in &stats.stages {
+        let histogram = stage.histogram().ok_or(format!("the histogram of {} is damaged; try again", stage.name))?;
+        let path: PathBuf = hgrm.with_file_name(format!("{stem}.{}.{extension}", stage.name));
+        output::whole(&path, |file| {
+            file.write_all(report::hgrm(&histogram).as_bytes()).map_err(|cause| format!("{}: {cause}", path.display()))
+        })?;
+    }
+    Ok(())
+}
