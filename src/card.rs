@@ -98,7 +98,14 @@ impl Card {
         };
         let bound95_mm = match get("ravenpose.bound95_mm") {
             None => [f64::NAN; 3],
-            Some(text) => numbers::<3>("ravenpose.bound95_mm", text)?.map(f64::from),
+            Some(text) => {
+                let key = "ravenpose.bound95_mm";
+                let bounds = numbers::<3>(key, text)?.map(f64::from);
+                if let Some(bound) = bounds.iter().find(|bound| **bound < 0.0) {
+                    return Err(CardError::Numbers { key, problem: format!("{bound} is not a half width") });
+                }
+                bounds
+            }
         };
         let golden = golden(get("ravenpose.golden").unwrap_or(""))?;
         if golden.is_empty() && !untrained {

@@ -2,14 +2,18 @@
 
 use crate::cycle::Limits;
 use ravenpose_transport::Settings;
-use serde::Deserialize;
+use std::io::Read;
 use std::ops::RangeInclusive;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 /// Largest configuration file that is read.
 const SIZE_MAX: u64 = 1 << 20;
+/// Longest piece of the file that a message repeats, in characters.
+const SHOWN_MAX: usize = 60;
 
 /// Why a configuration was refused; one line.
 #[derive(Debug, Error)]
@@ -37,8 +41,7 @@ pub enum ConfigError {
 }
 
 /// How the loop waits for the next state (`docs/decisions/0003`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wait {
     /// Poll without a pause: lowest latency, takes the whole core.
     Spin,
@@ -90,94 +93,25 @@ pub struct ModelSource {
     pub sha256: Option<String>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    #[serde(default)]
-    allow_untrained: bool,
-    #[serde(default)]
-    allow_degraded: bool,
-    transport: Option<TransportTable>,
-    r#loop: Option<LoopTable>,
-    limits: Option<LimitsTable>,
-    gold: Option<ModelTable>,
-    green: Option<ModelTable>,
-    report: Option<ReportTable>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TransportTable {
-    prefix: Option<Spanned<String>>,
-    root: Option<Spanned<String>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct LoopTable {
-    core: Option<Spanned<i64>>,
-    priority: Option<Spanned<i64>>,
-    wait: Option<Wait>,
-    spin_us: Option<Spanned<i64>>,
-    hold_cpu_dma_latency: Option<bool>,
-    lock_memory: Option<bool>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct LimitsTable {
-    period_us: Option<Spanned<i64>>,
-    stale_us: Option<Spanned<i64>>,
-    budget_us: Option<Spanned<i64>>,
-    good_cycles: Option<Spanned<i64>>,
-    recover_um_per_cycle: Option<Spanned<f64>>,
-    rate_um_per_cycle: Option<Spanned<f64>>,
-    envelope_mm: Option<Spanned<f64>>,
-    late_degraded: Option<Spanned<i64>>,
-    late_fallback: Option<Spanned<i64>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ModelTable {
-    model: PathBuf,
-    sha256: Option<Spanned<String>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct ReportTable {
-    runtime_dir: Option<PathBuf>,
-    histogram_dir: Option<PathBuf>,
-    interval_s: Option<Spanned<i64>>,
-}
-
-/// The text with its name, for messages that point into it.
-struct Source<'a> {
-    path: &'a str,
-    text: &'a str,
-}
-
 impl Config {
     /// Reads and checks a configuration file. Relative paths in it start at its own directory.
     ///
     /// # Errors
     /// [`ConfigError`], one line.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let name = path.display().to_string();
-        let unreadable = |cause: String| ConfigError::Unreadable { path: name.clone(), cause };
-        let size = std::fs::metadata(path).map_err(|cause| unreadable(cause.to_string()))?;
-        if !size.is_file() {
-            return Err(unreadable("not a regular file".to_owned()));
+        let name = shown_path(path);
+        let bytes = read_regular(path, SIZE_MAX).map_err(|cause| ConfigError::Unreadable { path: name.clone(), cause })?;
+        let refuse = |good: &[u8], message: &str| {
+            let good = String::from_utf8_lossy(good);
+            Source { path: &name, text: &good }.error(good.len(), format!("{message}; save the file as UTF-8"))
+        };
+        if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+            return Err(refuse(b"", "UTF-16 text"));
         }
-        if size.len() > SIZE_MAX {
-            return Err(unreadable(format!("{} bytes, more than the {SIZE_MAX} allowed", size.len())));
+        if let Some(zero) = bytes.iter().position(|byte| *byte == 0) {
+            return Err(refuse(&bytes[..zero], "a zero byte, as UTF-16 text has it"));
         }
-        let bytes = std::fs::read(path).map_err(|cause| unreadable(cause.to_string()))?;
-        let text = std::str::from_utf8(&bytes).map_err(|cause| {
-            let good = String::from_utf8_lossy(&bytes[..cause.valid_up_to()]).into_owned();
-            Source { path: &name, text: &good }.error(good.len(), "not UTF-8 text; save the file as UTF-8".to_owned())
-        })?;
+        let text = std::str::from_utf8(&bytes).map_err(|cause| refuse(&bytes[..cause.valid_up_to()], "not UTF-8 text"))?;
         Self::parse(&name, text, path.parent().unwrap_or(Path::new(".")))
     }
 
@@ -186,40 +120,100 @@ impl Config {
     /// # Errors
     /// [`ConfigError::Invalid`].
     pub fn parse(path: &str, text: &str, base: &Path) -> Result<Self, ConfigError> {
-        let source = Source { path, text };
-        let file: File = toml::from_str(text).map_err(|error| source.toml_error(&error))?;
-        let looping = file.r#loop.unwrap_or_default();
-        let limits = source.limits(file.limits.unwrap_or_default())?;
-        let report = file.report.unwrap_or_default();
-        let mut transport = Settings::default();
-        if let Some(table) = file.transport {
-            transport = source.transport(table, transport)?;
-        }
-        let model = |table: Option<ModelTable>| -> Result<Option<ModelSource>, ConfigError> {
-            let Some(table) = table else { return Ok(None) };
-            let sha256 = table.sha256.map(|hash| source.sha256(&hash)).transpose()?;
-            Ok(Some(ModelSource { path: base.join(table.model), sha256 }))
-        };
-        Ok(Self {
-            allow_untrained: file.allow_untrained,
-            allow_degraded: file.allow_degraded,
+        // Some editors mark UTF-8 so.
+        let source = Source { path, text: text.strip_prefix('\u{feff}').unwrap_or(text) };
+        let mut file = source.document()?;
+        let allow_untrained = file.boolean("allow_untrained", false)?;
+        let allow_degraded = file.boolean("allow_degraded", false)?;
+        let transport = transport(file.table("transport")?)?;
+        let mut looping = file.table("loop")?;
+        let limits = limits(file.table("limits")?)?;
+        let models = [model(file.optional_table("gold")?, base)?, model(file.optional_table("green")?, base)?];
+        let mut report = file.table("report")?;
+        let config = Self {
+            allow_untrained,
+            allow_degraded,
             transport,
-            core: source.integer("loop.core", looping.core, 0..=4095)?.map(|core| core as usize),
-            priority: source.integer("loop.priority", looping.priority, 1..=95)?.unwrap_or(80) as i32,
-            wait: looping.wait.unwrap_or(Wait::Sleep),
-            spin_ns: source.integer("loop.spin_us", looping.spin_us, 0..=900)?.unwrap_or(200) * 1000,
-            hold_cpu_dma_latency: looping.hold_cpu_dma_latency.unwrap_or(false),
-            lock_memory: looping.lock_memory.unwrap_or(true),
+            core: looping.integer("core", 0..=4095)?.map(|core| core as usize),
+            priority: looping.integer("priority", 1..=95)?.unwrap_or(80) as i32,
+            wait: looping.wait("wait")?.unwrap_or(Wait::Sleep),
+            spin_ns: looping.integer("spin_us", 0..=900)?.unwrap_or(200) * 1000,
+            hold_cpu_dma_latency: looping.boolean("hold_cpu_dma_latency", false)?,
+            lock_memory: looping.boolean("lock_memory", true)?,
             limits,
-            models: [model(file.gold)?, model(file.green)?],
-            runtime_dir: base.join(report.runtime_dir.unwrap_or_else(|| PathBuf::from("/run/ravenpose"))),
-            histogram_dir: report.histogram_dir.map(|dir| base.join(dir)),
-            interval_s: source.integer("report.interval_s", report.interval_s, 1..=86_400)?.unwrap_or(60) as u64,
-        })
+            models,
+            runtime_dir: base.join(report.path("runtime_dir")?.unwrap_or_else(|| PathBuf::from("/run/ravenpose"))),
+            histogram_dir: report.path("histogram_dir")?.map(|dir| base.join(dir)),
+            interval_s: report.integer("interval_s", 1..=86_400)?.unwrap_or(60) as u64,
+        };
+        looping.finish()?;
+        report.finish()?;
+        file.finish()?;
+        Ok(config)
     }
 }
 
-impl Source<'_> {
+fn limits(mut table: Table) -> Result<Limits, ConfigError> {
+    let default = Limits::default();
+    let (stale_at, period_at) = (table.place("stale_us"), table.place("period_us"));
+    let period_us = table.integer("period_us", 100..=100_000)?.unwrap_or(1000);
+    let limits = Limits {
+        period_ns: period_us * 1000,
+        stale_ns: table.integer("stale_us", 100..=1_000_000)?.map_or(default.stale_ns, |us| us * 1000),
+        budget_ns: table.integer("budget_us", 1..=100_000)?.map_or(default.budget_ns, |us| us * 1000),
+        good_cycles: table.integer("good_cycles", 1..=100_000)?.unwrap_or(100) as u32,
+        recover_um: table.number("recover_um_per_cycle", 0.01..=1000.0)?.unwrap_or(default.recover_um),
+        rate_um: table.number("rate_um_per_cycle", 0.01..=15_000.0)?.unwrap_or(default.rate_um),
+        envelope_um: table.number("envelope_mm", 0.01..=50.0)?.map_or(default.envelope_um, |mm| mm * 1000.0),
+        late_degraded: table.integer("late_degraded", 1..=1000)?.unwrap_or(3) as u32,
+        late_fallback: table.integer("late_fallback", 1..=1000)?.unwrap_or(10) as u32,
+    };
+    if limits.stale_ns <= limits.period_ns {
+        let by_default = if stale_at.is_none() { " (the default)" } else { "" };
+        let stale_us = limits.stale_ns / 1000;
+        let message = format!("limits.stale_us = {stale_us}{by_default} must be longer than limits.period_us = {period_us}");
+        return Err(table.source.error(stale_at.or(period_at).unwrap_or(0), message));
+    }
+    table.finish()?;
+    Ok(limits)
+}
+
+fn transport(mut table: Table) -> Result<Settings, ConfigError> {
+    let mut settings = Settings::default();
+    let good = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let prefix = |text: &str| (1..=32).contains(&text.len()) && text.chars().all(good);
+    if let Some(prefix) = table.text("prefix", "1 to 32 letters, digits, '_' or '-'", prefix)? {
+        settings.prefix = prefix;
+    }
+    let root = |text: &str| text.starts_with('/') && text.len() <= 100 && !text.contains(char::is_control);
+    if let Some(root) = table.text("root", "an absolute path of at most 100 bytes", root)? {
+        settings.root = if root.ends_with('/') { root } else { root + "/" };
+    }
+    table.finish()?;
+    Ok(settings)
+}
+
+fn model(table: Option<Table>, base: &Path) -> Result<Option<ModelSource>, ConfigError> {
+    let Some(mut table) = table else { return Ok(None) };
+    let path = table.path("model")?;
+    let hash = |text: &str| text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit());
+    let sha256 = table.text("sha256", "64 hexadecimal digits, as `sha256sum MODEL.onnx` prints", hash)?;
+    let (source, name, start) = (table.source, table.name, table.start);
+    table.finish()?;
+    match path {
+        Some(path) => Ok(Some(ModelSource { path: base.join(path), sha256: sha256.map(|hash| hash.to_ascii_lowercase()) })),
+        None => Err(source.error(start, format!("{name}.model is missing; add model = \"FILE.onnx\" to [{name}]"))),
+    }
+}
+
+/// The text with its name, for messages that point into it.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    path: &'a str,
+    text: &'a str,
+}
+
+impl<'a> Source<'a> {
     fn error(&self, offset: usize, message: String) -> ConfigError {
         let before = self.text.get(..offset).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
@@ -231,93 +225,170 @@ impl Source<'_> {
         }
     }
 
-    fn toml_error(&self, error: &toml::de::Error) -> ConfigError {
-        let message = error.message().lines().collect::<Vec<_>>().join(" ");
-        let message = match unknown_key(&message) {
-            Some((key, allowed)) => {
-                let nearest = nearest(key, &allowed).map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default();
-                format!("unknown key `{key}`{nearest}; allowed here: {}", allowed.join(", "))
+    fn document(self) -> Result<Table<'a>, ConfigError> {
+        let entries = DeTable::parse(self.text).map_err(|error| self.syntax(&error))?.into_inner();
+        Ok(Table { source: self, name: "", start: 0, entries, taken: Vec::new() })
+    }
+
+    fn syntax(&self, error: &toml::de::Error) -> ConfigError {
+        let span = error.span().unwrap_or(0..0);
+        let start = span.start;
+        if error.message() == "duplicate key" {
+            let key = one_line(self.text.get(span).unwrap_or_default(), SHOWN_MAX);
+            return self.error(start, format!("`{key}` is given twice; keep one"));
+        }
+        let before = self.text.get(..start).unwrap_or_default();
+        let line = self.text[before.rfind('\n').map_or(0, |at| at + 1)..].lines().next().unwrap_or_default().trim();
+        let place = if line.is_empty() { String::new() } else { format!(" in `{}`", one_line(line, SHOWN_MAX)) };
+        let problem = match error.message() {
+            // What toml says of every value that it cannot read.
+            vague if vague.starts_with("string values must be quoted") => {
+                "the value is missing, followed by something else, or text without quotes".to_owned()
             }
-            None => format!("{message}; see docs/configuration.md"),
+            exact => one_line(exact, 2 * SHOWN_MAX),
         };
-        self.error(error.span().map_or(0, |span| span.start), message)
-    }
-
-    fn integer(&self, key: &str, value: Option<Spanned<i64>>, allowed: RangeInclusive<i64>) -> Result<Option<i64>, ConfigError> {
-        let Some(value) = value else { return Ok(None) };
-        let (start, value) = (value.span().start, value.into_inner());
-        if allowed.contains(&value) {
-            return Ok(Some(value));
-        }
-        Err(self.error(start, format!("{key} = {value} is outside {} to {}", allowed.start(), allowed.end())))
-    }
-
-    fn number(&self, key: &str, value: Option<Spanned<f64>>, low: f64, high: f64, default: f64) -> Result<f64, ConfigError> {
-        let Some(value) = value else { return Ok(default) };
-        let (start, value) = (value.span().start, value.into_inner());
-        if value >= low && value <= high {
-            return Ok(value);
-        }
-        Err(self.error(start, format!("{key} = {value} is outside {low} to {high}")))
-    }
-
-    fn limits(&self, table: LimitsTable) -> Result<Limits, ConfigError> {
-        let default = Limits::default();
-        let period_us = self.integer("limits.period_us", table.period_us, 100..=100_000)?.unwrap_or(1000);
-        let stale = table.stale_us.as_ref().map_or(0, |value| value.span().start);
-        let limits = Limits {
-            period_ns: period_us * 1000,
-            stale_ns: self.integer("limits.stale_us", table.stale_us, 100..=1_000_000)?.map_or(default.stale_ns, |us| us * 1000),
-            budget_ns: self.integer("limits.budget_us", table.budget_us, 1..=100_000)?.map_or(default.budget_ns, |us| us * 1000),
-            good_cycles: self.integer("limits.good_cycles", table.good_cycles, 1..=100_000)?.unwrap_or(100) as u32,
-            recover_um: self.number("limits.recover_um_per_cycle", table.recover_um_per_cycle, 0.01, 1000.0, default.recover_um)?,
-            rate_um: self.number("limits.rate_um_per_cycle", table.rate_um_per_cycle, 0.01, 15_000.0, default.rate_um)?,
-            envelope_um: self.number("limits.envelope_mm", table.envelope_mm, 0.01, 50.0, default.envelope_um / 1000.0)? * 1000.0,
-            late_degraded: self.integer("limits.late_degraded", table.late_degraded, 1..=1000)?.unwrap_or(3) as u32,
-            late_fallback: self.integer("limits.late_fallback", table.late_fallback, 1..=1000)?.unwrap_or(10) as u32,
-        };
-        if limits.stale_ns <= limits.period_ns {
-            return Err(self.error(
-                stale,
-                format!("limits.stale_us = {} must be longer than limits.period_us = {period_us}", limits.stale_ns / 1000),
-            ));
-        }
-        Ok(limits)
-    }
-
-    fn transport(&self, table: TransportTable, mut settings: Settings) -> Result<Settings, ConfigError> {
-        if let Some(prefix) = table.prefix {
-            let (start, prefix) = (prefix.span().start, prefix.into_inner());
-            let good = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-            if prefix.is_empty() || prefix.len() > 32 || !prefix.chars().all(good) {
-                return Err(self.error(start, format!("transport.prefix = {prefix:?} must be 1 to 32 letters, digits, '_' or '-'")));
-            }
-            settings.prefix = prefix;
-        }
-        if let Some(root) = table.root {
-            let (start, root) = (root.span().start, root.into_inner());
-            if !root.starts_with('/') || root.len() > 100 {
-                return Err(self.error(start, format!("transport.root = {root:?} must be an absolute path of at most 100 bytes")));
-            }
-            settings.root = if root.ends_with('/') { root } else { root + "/" };
-        }
-        Ok(settings)
-    }
-
-    fn sha256(&self, hash: &Spanned<String>) -> Result<String, ConfigError> {
-        let text = hash.get_ref();
-        if text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit()) {
-            return Ok(text.to_ascii_lowercase());
-        }
-        Err(self.error(hash.span().start, "sha256 must be 64 hexadecimal digits, as `sha256sum MODEL.onnx` prints".to_owned()))
+        self.error(start, format!("not TOML{place}: {problem}; write key = value, text in double quotes, tables as [name]"))
     }
 }
 
-/// The key and the allowed keys of serde's message "unknown field `x`, expected `a` or `b`" / "expected one of `a`, `b`".
-fn unknown_key(message: &str) -> Option<(&str, Vec<&str>)> {
-    let rest = message.strip_prefix("unknown field `")?;
-    let (key, rest) = rest.split_once('`')?;
-    Some((key, rest.split('`').skip(1).step_by(2).collect()))
+/// A table of the file. Each key is taken once; what is left at the end is unknown.
+struct Table<'a> {
+    source: Source<'a>,
+    /// Empty for the file itself.
+    name: &'static str,
+    start: usize,
+    entries: DeTable<'a>,
+    taken: Vec<&'static str>,
+}
+
+impl<'a> Table<'a> {
+    fn place(&self, key: &str) -> Option<usize> {
+        self.entries.get(key).map(|value| value.span().start)
+    }
+
+    /// Takes a key's value and reads it; `read` gives `None` for whatever is not `wanted`.
+    fn take<T>(
+        &mut self,
+        key: &'static str,
+        wanted: &str,
+        read: impl FnOnce(&DeValue<'a>) -> Option<T>,
+    ) -> Result<Option<T>, ConfigError> {
+        self.taken.push(key);
+        let Some(value) = self.entries.remove(key) else { return Ok(None) };
+        read(value.get_ref()).map(Some).ok_or_else(|| self.refuse(key, &value, wanted))
+    }
+
+    fn refuse(&self, key: &str, value: &Spanned<DeValue>, wanted: &str) -> ConfigError {
+        let dot = if self.name.is_empty() { "" } else { "." };
+        let found = match value.get_ref() {
+            DeValue::Table(_) => " is a table and".to_owned(),
+            DeValue::Array(_) => " is a list and".to_owned(),
+            _ => format!(" = {}", one_line(self.source.text.get(value.span()).unwrap_or_default(), SHOWN_MAX)),
+        };
+        self.source.error(value.span().start, format!("{}{dot}{key}{found} must be {wanted}", self.name))
+    }
+
+    fn integer(&mut self, key: &'static str, allowed: RangeInclusive<i64>) -> Result<Option<i64>, ConfigError> {
+        let wanted = format!("a whole number from {} to {}", allowed.start(), allowed.end());
+        self.take(key, &wanted, |value| whole(value).filter(|number| allowed.contains(number)))
+    }
+
+    fn number(&mut self, key: &'static str, allowed: RangeInclusive<f64>) -> Result<Option<f64>, ConfigError> {
+        let wanted = format!("a number from {} to {}", allowed.start(), allowed.end());
+        self.take(key, &wanted, |value| {
+            let number = match value {
+                DeValue::Float(float) => float.as_str().parse().ok(),
+                _ => whole(value).map(|number| number as f64),
+            };
+            number.filter(|number| allowed.contains(number))
+        })
+    }
+
+    fn boolean(&mut self, key: &'static str, default: bool) -> Result<bool, ConfigError> {
+        Ok(self.take(key, "true or false, without quotes", DeValue::as_bool)?.unwrap_or(default))
+    }
+
+    fn text(&mut self, key: &'static str, wanted: &str, good: impl Fn(&str) -> bool) -> Result<Option<String>, ConfigError> {
+        let wanted = format!("{wanted}, in quotes");
+        self.take(key, &wanted, |value| value.as_str().filter(|text| good(text)).map(str::to_owned))
+    }
+
+    fn path(&mut self, key: &'static str) -> Result<Option<PathBuf>, ConfigError> {
+        let good = |text: &str| !text.is_empty() && !text.contains(char::is_control);
+        Ok(self.text(key, "a path without control characters", good)?.map(PathBuf::from))
+    }
+
+    fn wait(&mut self, key: &'static str) -> Result<Option<Wait>, ConfigError> {
+        const WAITS: [(&str, Wait); 3] = [("spin", Wait::Spin), ("sleep", Wait::Sleep), ("event", Wait::Event)];
+        self.take(key, "\"spin\", \"sleep\" or \"event\"", |value| {
+            WAITS.iter().find(|(name, _)| value.as_str() == Some(name)).map(|(_, wait)| *wait)
+        })
+    }
+
+    fn optional_table(&mut self, key: &'static str) -> Result<Option<Self>, ConfigError> {
+        let (source, start) = (self.source, self.place(key).unwrap_or(0));
+        let entries = self.take(key, &format!("a table, written [{key}] once"), |value| value.as_table().cloned())?;
+        Ok(entries.map(|entries| Self { source, name: key, start, entries, taken: Vec::new() }))
+    }
+
+    /// The table, or an empty one.
+    fn table(&mut self, key: &'static str) -> Result<Self, ConfigError> {
+        let source = self.source;
+        let empty = || Self { source, name: key, start: 0, entries: DeTable::new(), taken: Vec::new() };
+        Ok(self.optional_table(key)?.unwrap_or_else(empty))
+    }
+
+    fn finish(self) -> Result<(), ConfigError> {
+        let Some(unknown) = self.entries.keys().min_by_key(|key| key.span().start) else { return Ok(()) };
+        let key = unknown.get_ref();
+        let hint = nearest(key, &self.taken).map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default();
+        let place = if self.name.is_empty() { String::new() } else { format!(" in [{}]", self.name) };
+        let message = format!("unknown key `{}`{place}{hint}; allowed here: {}", one_line(key, SHOWN_MAX), self.taken.join(", "));
+        Err(self.source.error(unknown.span().start, message))
+    }
+}
+
+fn whole(value: &DeValue) -> Option<i64> {
+    let integer = value.as_integer()?;
+    i64::from_str_radix(integer.as_str(), integer.radix()).ok()
+}
+
+/// Reads a regular file of bounded size. Never blocks: opening a FIFO would otherwise wait for a writer.
+pub(crate) fn read_regular(path: &Path, size_max: u64) -> Result<Vec<u8>, String> {
+    let words = |cause: std::io::Error| cause.to_string();
+    let file = std::fs::OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path).map_err(words)?;
+    let metadata = file.metadata().map_err(words)?;
+    if !metadata.is_file() {
+        return Err("not a regular file".to_owned());
+    }
+    if metadata.len() > size_max {
+        return Err(format!("{} bytes, more than the {size_max} allowed", metadata.len()));
+    }
+    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    // The file may grow while it is read: never take more than was allowed.
+    let read = file.take(size_max).read_to_end(&mut bytes).map_err(words)?;
+    if read as u64 != metadata.len() {
+        return Err("the file changed while it was read; try again".to_owned());
+    }
+    Ok(bytes)
+}
+
+/// A path as messages show it.
+pub(crate) fn shown_path(path: &Path) -> String {
+    one_line(&path.display().to_string(), 4096)
+}
+
+/// Foreign text made fit for one line of a log: whatever could end the line, move the cursor or reverse the text is escaped.
+pub(crate) fn one_line(raw: &str, chars_max: usize) -> String {
+    let mut line = String::new();
+    for (count, c) in raw.chars().enumerate() {
+        if count == chars_max {
+            line.push('…');
+            break;
+        }
+        if matches!(c, '"' | '\'' | '\\') { line.push(c) } else { line.extend(c.escape_debug()) }
+    }
+    line
 }
 
 /// The allowed key with the fewest edits, if that is near enough to be a slip.

@@ -4,6 +4,7 @@
 //! clock and shared memory; [`service`] starts it and is the ordinary thread beside it; everything else serves these three.
 
 pub mod card;
+pub mod check;
 pub mod config;
 pub mod cycle;
 pub mod frozen;
@@ -17,3 +18,10 @@ pub mod runner;
 pub mod service;
 pub mod shared;
 pub mod signals;
+pub mod watch;
+pub mod writer;
+
+/// A line in the log; the loop itself never calls this.
+pub(crate) fn say(message: &str) {
+    eprintln!("ravenposed: {message}");
+}

@@ -1,19 +1,20 @@
 //! From a file to a model that the loop may run: size, hash, import, card, plan, golden pairs. Each step refuses with one line.
 
 use crate::card::{Card, CardError};
-use crate::config::ModelSource;
+use crate::config::{self, ModelSource, shown_path};
 use crate::cycle::{Estimator, Model};
 use crate::guard::Guard;
 use crate::network::Plan;
 use ravenpose_importer::{Expected, ImportError, Network};
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Largest model file that is read: ten million float32 weights are 40 MB.
 const SIZE_MAX: u64 = 128 << 20;
+/// Largest `FILE.sha256` that is read; `sha256sum` writes one line.
+const HASH_FILE_SIZE_MAX: u64 = 8192;
 /// Largest difference to a golden output, relative to max(1, |value|): what float32 sums of this size differ by.
 const GOLDEN_TOLERANCE: f64 = 1e-4;
 /// Inputs and outputs of every model.
@@ -23,7 +24,7 @@ pub const EXPECTED: Expected = Expected { inputs: FEATURES, outputs: 3 };
 #[derive(Debug, Error)]
 pub enum ModelError {
     /// The file cannot be read.
-    #[error("{path}: cannot read the model: {cause}")]
+    #[error("{path}: cannot read the model: {cause}; give the path of an ONNX file")]
     Unreadable {
         /// The file.
         path: String,
@@ -99,22 +100,7 @@ impl Estimator for Plan {
 /// # Errors
 /// [`ModelError::Unreadable`].
 pub fn read(path: &Path) -> Result<Vec<u8>, ModelError> {
-    let unreadable = |cause: String| ModelError::Unreadable { path: path.display().to_string(), cause };
-    let file = std::fs::File::open(path).map_err(|cause| unreadable(cause.to_string()))?;
-    let metadata = file.metadata().map_err(|cause| unreadable(cause.to_string()))?;
-    if !metadata.is_file() {
-        return Err(unreadable("not a regular file".to_owned()));
-    }
-    if metadata.len() > SIZE_MAX {
-        return Err(unreadable(format!("{} bytes, more than the {SIZE_MAX} allowed", metadata.len())));
-    }
-    let mut bytes = Vec::with_capacity(metadata.len() as usize);
-    // The file may grow while it is read: never take more than was allowed.
-    let read = file.take(SIZE_MAX).read_to_end(&mut bytes).map_err(|cause| unreadable(cause.to_string()))?;
-    if read as u64 != metadata.len() {
-        return Err(unreadable("the file changed while it was read; try again".to_owned()));
-    }
-    Ok(bytes)
+    config::read_regular(path, SIZE_MAX).map_err(|cause| ModelError::Unreadable { path: shown_path(path), cause })
 }
 
 /// Imports a network as `ravenpose infer` does: no hash and no card wanted.
@@ -126,7 +112,7 @@ pub fn network(path: &Path) -> Result<Network, ModelError> {
 }
 
 fn import(path: &Path, bytes: &[u8]) -> Result<Network, ModelError> {
-    ravenpose_importer::import(bytes, &EXPECTED).map_err(|cause| ModelError::Import { path: path.display().to_string(), cause })
+    ravenpose_importer::import(bytes, &EXPECTED).map_err(|cause| ModelError::Import { path: shown_path(path), cause })
 }
 
 /// Loads a model as the service does: hash first, then import, card and golden pairs. The file is not needed afterwards.
@@ -134,7 +120,7 @@ fn import(path: &Path, bytes: &[u8]) -> Result<Network, ModelError> {
 /// # Errors
 /// Any [`ModelError`].
 pub fn load(source: &ModelSource) -> Result<(Model<Plan>, Card), ModelError> {
-    let path = source.path.display().to_string();
+    let path = shown_path(&source.path);
     let bytes = read(&source.path)?;
     let digest: [u8; 32] = Sha256::digest(&bytes).into();
     check_hash(source, &path, &hex(&digest))?;
@@ -178,19 +164,19 @@ fn stated_hash(model: &Path) -> Result<(String, String), ModelError> {
     let mut beside = model.as_os_str().to_owned();
     beside.push(".sha256");
     let beside = PathBuf::from(beside);
+    let shown = shown_path(&beside);
     let no_hash = |cause: String| ModelError::NoHash {
-        path: model.display().to_string(),
-        name: model.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        cause,
+        path: shown_path(model),
+        name: shown_path(Path::new(model.file_name().unwrap_or_default())),
+        cause: format!("{shown}: {cause}"),
     };
-    let mut text = String::new();
-    let file = std::fs::File::open(&beside).map_err(|cause| no_hash(format!("{}: {cause}", beside.display())))?;
-    file.take(4096).read_to_string(&mut text).map_err(|cause| no_hash(format!("{}: {cause}", beside.display())))?;
+    let bytes = config::read_regular(&beside, HASH_FILE_SIZE_MAX).map_err(no_hash)?;
+    let text = String::from_utf8_lossy(&bytes);
     let hash = text.split_ascii_whitespace().next().unwrap_or_default();
     if hash.len() != 64 || !hash.chars().all(|c| c.is_ascii_hexdigit()) {
-        return Err(no_hash(format!("{} does not begin with 64 hexadecimal digits", beside.display())));
+        return Err(no_hash("does not begin with 64 hexadecimal digits".to_owned()));
     }
-    Ok((hash.to_owned(), beside.display().to_string()))
+    Ok((hash.to_owned(), shown))
 }
 
 fn check_golden(path: &str, plan: &mut Plan, card: &Card) -> Result<(), ModelError> {

@@ -233,7 +233,7 @@ impl<E: Estimator> Runner<E> {
                 None
             }
             Wait::Event => {
-                let deadline = (expected + period / 2).min(stale);
+                let deadline = (expected + period / 4).min(stale);
                 let mut left = deadline - now;
                 while left > 0 && !self.waiting_state() {
                     if let Some(listener) = &self.link.listener {

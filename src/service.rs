@@ -2,15 +2,15 @@
 
 use crate::config::{Config, Wait};
 use crate::cycle::{ArmModel, Cycle};
-use crate::histogram::{self, Collector, Histograms};
+use crate::histogram::{self, Histograms};
 use crate::network::Plan;
 use crate::realtime::{self, Missing};
-use crate::report::{self, Log, Stats};
 use crate::runner::{Ended, Runner, TestHook, Waiting};
-use crate::shared::{self, Event, EventReceiver, EventSender, Shared};
-use crate::{model, signals};
-use ravenpose_transport::{Message, Probe};
-use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, RavenState, flag, flag_names};
+use crate::shared::{self, EventSender, Shared};
+use crate::watch::{NAMES, TICK, Watch, notify};
+use crate::{model, say, signals};
+use ravenpose_transport::Message;
+use ravenpose_wire::{ARMS, CorrectedPose, flag};
 use sd_notify::NotifyState;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,11 +20,6 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-const NAMES: [&str; ARMS] = ["gold", "green"];
-/// How often the ordinary thread looks: well inside the watchdog's 250 ms.
-const TICK: Duration = Duration::from_millis(50);
-/// How often `stats.json` is written and the link is probed.
-const SECOND: Duration = Duration::from_secs(1);
 /// Longest wait for the loop to send its last message.
 const STOP_MAX: Duration = Duration::from_millis(100);
 
@@ -62,10 +57,6 @@ pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
 fn refuse(message: &str) -> ExitCode {
     eprintln!("ravenposed: {message}");
     ExitCode::from(2)
-}
-
-fn say(message: &str) {
-    eprintln!("ravenposed: {message}");
 }
 
 fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments>, String> {
@@ -189,27 +180,6 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
     Ok(Prepared { models, names })
 }
 
-/// The ordinary thread's view of the running service.
-struct Watch {
-    shared: Arc<Shared>,
-    collector: Collector,
-    events: EventReceiver,
-    interval: Histograms,
-    total: Histograms,
-    log: Option<Log>,
-    stats_path: PathBuf,
-    names: [String; ARMS],
-    started: Instant,
-    interval_began: Instant,
-    lines: Lines,
-    heartbeat: u64,
-    probe: Option<Probe>,
-    unreachable: u32,
-    write_failed: bool,
-    silent_since: Option<Instant>,
-    silence_explained: bool,
-}
-
 type Loop = JoinHandle<Result<Box<Histograms>, String>>;
 
 fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHook>) -> Result<ExitCode, String> {
@@ -230,18 +200,19 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
         eprintln!("ravenposed: internal error: {panic}");
         std::process::abort();
     }));
-    let mut watch = Watch::new(config, shared, collector, events, prepared.names)?;
+    let mut watch = Watch::new(config, shared, collector, events, prepared.names, standing == 0)?;
     notify(&[NotifyState::Ready, NotifyState::Status("running")]);
-    say(&format!("running; poses on {}, statistics in {}", CorrectedPose::SERVICE, watch.stats_path.display()));
+    say(&format!("running; poses on {}, statistics in {}", CorrectedPose::SERVICE, watch.stats_path().display()));
     while !signals::wait(TICK) {
         if handle.is_finished() {
             watch.finish(None);
-            return Err(match handle.join() {
+            say(&match handle.join() {
                 Ok(Err(message)) => message,
                 _ => "the loop ended by itself".to_owned(),
             });
+            return Ok(ExitCode::FAILURE);
         }
-        watch.tick(Duration::from_secs(config.interval_s));
+        watch.tick();
     }
     notify(&[NotifyState::Stopping]);
     watch.shared.stop.store(true, Relaxed);
@@ -257,11 +228,6 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn notify(states: &[NotifyState]) {
-    // Without NOTIFY_SOCKET this does nothing; a failure must not end the service.
-    let _ = sd_notify::notify(states);
 }
 
 fn spawn_loop(
@@ -302,191 +268,4 @@ fn spawn_loop(
             Ok(runner.into_recorder().into_active())
         })
         .map_err(|cause| format!("the loop's thread cannot be started: {cause}"))
-}
-
-impl Watch {
-    fn new(
-        config: &Config,
-        shared: Arc<Shared>,
-        collector: Collector,
-        events: EventReceiver,
-        names: [String; ARMS],
-    ) -> Result<Self, String> {
-        let log = match &config.histogram_dir {
-            None => None,
-            Some(dir) => match Log::create(dir) {
-                Ok(log) => Some(log),
-                Err(cause) => {
-                    say(&format!("{}: histograms cannot be written here ({cause}); set report.histogram_dir", dir.display()));
-                    None
-                }
-            },
-        };
-        if let Err(cause) = std::fs::create_dir_all(&config.runtime_dir) {
-            say(&format!("{}: statistics cannot be written here ({cause}); set report.runtime_dir", config.runtime_dir.display()));
-        }
-        Ok(Self {
-            shared,
-            collector,
-            events,
-            interval: Histograms::new(),
-            total: Histograms::new(),
-            log,
-            stats_path: config.runtime_dir.join("stats.json"),
-            names,
-            started: Instant::now(),
-            interval_began: Instant::now(),
-            lines: Lines::default(),
-            heartbeat: 0,
-            probe: Some(Probe::open(&config.transport).map_err(|error| error.to_string())?),
-            unreachable: 0,
-            write_failed: false,
-            silent_since: None,
-            silence_explained: false,
-        })
-    }
-
-    fn tick(&mut self, interval: Duration) {
-        let heartbeat = self.shared.heartbeat.load(Relaxed);
-        if heartbeat != self.heartbeat {
-            self.heartbeat = heartbeat;
-            notify(&[NotifyState::Watchdog]);
-        }
-        while let Some(event) = self.events.dequeue() {
-            self.lines.take(&event);
-        }
-        if self.lines.due() {
-            self.lines.print();
-            self.collect(None);
-            self.check_link();
-            self.write_stats();
-            if self.interval_began.elapsed() >= interval {
-                self.write_log();
-            }
-        }
-    }
-
-    fn collect(&mut self, last: Option<&Histograms>) {
-        let (interval, total) = (&mut self.interval, &mut self.total);
-        let mut add = |set: &Histograms| {
-            interval.add(set);
-            total.add(set);
-        };
-        self.collector.collect(&mut add);
-        last.map(add);
-    }
-
-    /// Are our ports among those that a newcomer finds? And does a publisher's data reach us?
-    fn check_link(&mut self) {
-        let Some(probe) = &self.probe else { return };
-        let (publishers, readers) = probe.count::<RavenState>();
-        let (poses, _) = probe.count::<CorrectedPose>();
-        let seen = readers > 0 && poses > 0;
-        self.unreachable = if seen { 0 } else { self.unreachable + 1 };
-        if self.unreachable >= 2 {
-            self.unreachable = 0;
-            say("the shared files were removed under the service (RemoveIPC, a tmp cleaner?); opening the link anew");
-            self.shared.reopen.store(true, Relaxed);
-        }
-        let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
-        let never = self.shared.counters()[1] == 0;
-        if publishers == 0 || !(stale || never) {
-            self.silent_since = None;
-            self.silence_explained = false;
-        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed() > 2 * SECOND && !self.silence_explained {
-            self.silence_explained = true;
-            say(&format!(
-                "a publisher of {} is connected but its states do not arrive; it is stopped, or runs as another user: all parties must run as the same user",
-                RavenState::SERVICE
-            ));
-        }
-    }
-
-    fn write_stats(&mut self) {
-        let stats = Stats::collect(&self.shared, &self.total, self.started.elapsed(), &self.names);
-        let written = serde_json::to_vec(&stats)
-            .map_err(std::io::Error::other)
-            .and_then(|bytes| report::write_whole(&self.stats_path, &bytes));
-        self.complain_once(written, "statistics");
-    }
-
-    fn write_log(&mut self) {
-        let length = self.interval_began.elapsed();
-        let Some(log) = &self.log else { return };
-        let written = log.write(&self.interval, &self.total, length);
-        if written.is_ok() {
-            // What could not be written stays for the next try.
-            self.interval.clear();
-            self.interval_began = Instant::now();
-        }
-        self.complain_once(written, "histograms");
-    }
-
-    fn complain_once(&mut self, written: std::io::Result<()>, what: &str) {
-        match written {
-            Ok(()) => self.write_failed = false,
-            Err(cause) if !self.write_failed => {
-                self.write_failed = true;
-                say(&format!("{what} cannot be written ({cause}); the loop goes on, trying again each second"));
-            }
-            Err(_) => {}
-        }
-    }
-
-    fn finish(&mut self, last: Option<&Histograms>) {
-        while let Some(event) = self.events.dequeue() {
-            self.lines.take(&event);
-        }
-        self.lines.print();
-        self.collect(last);
-        self.write_log();
-        self.write_stats();
-    }
-}
-
-/// At most one line per kind of event and second, with a count of what it stands for.
-#[derive(Default)]
-struct Lines {
-    last: [Option<Event>; Event::KINDS],
-    counts: [u64; Event::KINDS],
-    printed: Option<Instant>,
-}
-
-impl Lines {
-    fn take(&mut self, event: &Event) {
-        self.last[event.kind()] = Some(*event);
-        self.counts[event.kind()] += 1;
-    }
-
-    fn due(&self) -> bool {
-        self.printed.is_none_or(|printed| printed.elapsed() >= SECOND)
-    }
-
-    fn print(&mut self) {
-        self.printed = Some(Instant::now());
-        for (last, count) in self.last.iter_mut().zip(&mut self.counts) {
-            if let Some(event) = last.take() {
-                let repeated = if *count > 1 { format!(" ({count} such events in the last second)") } else { String::new() };
-                say(&format!("{}{repeated}", describe(&event)));
-            }
-            *count = 0;
-        }
-    }
-}
-
-fn describe(event: &Event) -> String {
-    match *event {
-        Event::Arm { arm, status, flags, sequence } => {
-            let names: Vec<_> = flag_names(flags).collect();
-            format!("{} arm: {} [{}] at state {sequence}", NAMES[arm], ArmStatus::name(status), names.join(" "))
-        }
-        Event::Source { id, sequence } => format!("control process {id:016x} from state {sequence}"),
-        Event::Lost { total, sequence } => format!("states missing before {sequence}; {total} in all"),
-        Event::Refused { total } => {
-            format!("messages refused (other layout, torn, or not on this machine's CLOCK_MONOTONIC); {total} in all")
-        }
-        Event::Late { took_ns, sequence } => format!("state {sequence} took {:.1} us, beyond the budget", took_ns as f64 / 1000.0),
-        Event::Link { receive, send } => format!("link failures: {receive} receiving, {send} sending"),
-        Event::Reopened => "the link was opened anew".to_owned(),
-    }
 }

@@ -260,13 +260,9 @@ typedef struct ravenpose_options {
    */
   uint32_t queue_depth;
   /*
-   Publisher: 1 rings the service's bell with every state (`wait = "event"`; one system call each).
-   */
-  uint32_t ring_bell;
-  /*
    Zero.
    */
-  uint32_t reserved;
+  uint32_t reserved[2];
   /*
    Prefix of the shared files (null: `RAVENPOSE_PREFIX`, else `iox2_`).
    */
@@ -530,4 +526,4 @@ uint32_t ravenpose_arms(void);
 
 /* Options as this program was compiled: ravenpose_options options = RAVENPOSE_OPTIONS_INIT; */
 #define RAVENPOSE_OPTIONS_INIT \
-  { RAVENPOSE_ABI_VERSION, (uint32_t)sizeof(ravenpose_state), (uint32_t)sizeof(ravenpose_pose), 0u, 0u, 0u, NULL, NULL }
+  { RAVENPOSE_ABI_VERSION, (uint32_t)sizeof(ravenpose_state), (uint32_t)sizeof(ravenpose_pose), 0u, {0u, 0u}, NULL, NULL }

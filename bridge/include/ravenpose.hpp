@@ -29,7 +29,6 @@ struct Options {
   std::string prefix;        // empty: RAVENPOSE_PREFIX, else iox2_
   std::string root;          // empty: RAVENPOSE_ROOT, else /tmp/iceoryx2/
   uint32_t queue_depth = 1;  // readers: messages kept while nobody takes them, 1 to 64
-  bool ring_bell = false;    // publisher: for a service with wait = "event"
 };
 
 namespace detail {
@@ -40,7 +39,6 @@ Handle *open(const Options &options, Open &&call) {
   c.prefix = options.prefix.empty() ? nullptr : options.prefix.c_str();
   c.root = options.root.empty() ? nullptr : options.root.c_str();
   c.queue_depth = options.queue_depth;
-  c.ring_bell = options.ring_bell ? 1u : 0u;
   Handle *handle = nullptr;
   char message[512] = "";
   const int32_t code = call(&c, &handle, message, sizeof message);

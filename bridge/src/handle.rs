@@ -24,16 +24,16 @@ fn refused(error: &TransportError) -> (Code, String) {
 /// The one publisher of states.
 pub struct Publisher {
     writer: Writer<RavenState>,
-    bell: Option<Bell>,
+    bell: Bell,
     loan: Option<Loan<RavenState>>,
     source_id: u64,
     next_sequence: u64,
 }
 
 impl Publisher {
-    pub(crate) fn open(settings: &Settings, ring_bell: bool) -> Result<Self, (Code, String)> {
+    pub(crate) fn open(settings: &Settings) -> Result<Self, (Code, String)> {
         let writer = Writer::open(settings).map_err(|error| refused(&error))?;
-        let bell = if ring_bell { Some(Bell::open(settings).map_err(|error| refused(&error))?) } else { None };
+        let bell = Bell::open(settings).map_err(|error| refused(&error))?;
         Ok(Self { writer, bell, loan: None, source_id: source_id(), next_sequence: 1 })
     }
 
@@ -86,9 +86,8 @@ impl Publisher {
     fn rung(&self, sent: Result<usize, TransportError>) -> Code {
         match sent {
             Ok(_) => {
-                if let Some(bell) = &self.bell {
-                    bell.ring();
-                }
+                // Costs a system call only while a service with wait = "event" listens.
+                self.bell.ring();
                 Code::Ok
             }
             Err(error) => Code::of(&error),

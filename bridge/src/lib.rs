@@ -37,10 +37,8 @@ pub struct Options {
     pub pose_size: u32,
     /// Readers: messages kept while nobody takes them, 1 to 64 (0: 1, the newest only).
     pub queue_depth: u32,
-    /// Publisher: 1 rings the service's bell with every state (`wait = "event"`; one system call each).
-    pub ring_bell: u32,
     /// Zero.
-    pub reserved: u32,
+    pub reserved: [u32; 2],
     /// Prefix of the shared files (null: `RAVENPOSE_PREFIX`, else `iox2_`).
     pub prefix: *const c_char,
     /// Root of the shared files (null: `RAVENPOSE_ROOT`, else `/tmp/iceoryx2/`).
@@ -166,9 +164,7 @@ pub unsafe extern "C" fn ravenpose_publisher_open(
     message_size: usize,
 ) -> i32 {
     // SAFETY: the caller's pointers, checked for null inside.
-    unsafe {
-        open(options, publisher, message, message_size, |settings, options| Publisher::open(settings, options.ring_bell != 0))
-    }
+    unsafe { open(options, publisher, message, message_size, |settings, _| Publisher::open(settings)) }
 }
 
 /// Gives a place in shared memory to write the next state into: zeros, with version, size, source and the next sequence number set.

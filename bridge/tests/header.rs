@@ -56,7 +56,7 @@ fn tables() -> String {
 const TRAILER: &str = "
 /* Options as this program was compiled: ravenpose_options options = RAVENPOSE_OPTIONS_INIT; */
 #define RAVENPOSE_OPTIONS_INIT \\
-  { RAVENPOSE_ABI_VERSION, (uint32_t)sizeof(ravenpose_state), (uint32_t)sizeof(ravenpose_pose), 0u, 0u, 0u, NULL, NULL }
+  { RAVENPOSE_ABI_VERSION, (uint32_t)sizeof(ravenpose_state), (uint32_t)sizeof(ravenpose_pose), 0u, {0u, 0u}, NULL, NULL }
 ";
 
 #[test]

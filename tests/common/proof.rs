@@ -93,10 +93,12 @@ pub fn forbid_system_calls_but(allowed: &[i64]) {
 /// leaving its shared memory in order (it cannot, under the filter), so that is removed here.
 pub fn in_child(test: &str, role: &str) -> std::process::Output {
     let prefix = format!("rp{role}{}_", std::process::id());
+    let dir = super::common::TempDir::new(role);
     let output = std::process::Command::new(std::env::current_exe().expect("this program"))
         .args([test, "--exact", "--nocapture", "--test-threads=1"])
         .env("RAVENPOSE_TEST_ROLE", role)
         .env("RAVENPOSE_PREFIX", &prefix)
+        .env("RAVENPOSE_ROOT", format!("{}/iceoryx2/", dir.0.display()))
         .output()
         .expect("the child runs");
     super::common::remove_shared_memory(&prefix);

@@ -1,5 +1,5 @@
-//! A bell beside `raven/state`, for the service's event mode: it costs the publisher one system call per message, so it is rung only
-//! where that is asked for.
+//! A bell beside `raven/state`, for the service's event mode. Ringing costs the publisher one system call per message while somebody
+//! listens, and none while nobody does.
 
 use crate::{Settings, TransportError};
 use iceoryx2::node::Node;
@@ -43,7 +43,7 @@ impl Bell {
         Ok(Self { notifier, _opened: opened })
     }
 
-    /// Rings; returns whether anybody listens. Never blocks.
+    /// Rings; returns whether anybody listens. Never blocks, and makes no system call while nobody does.
     pub fn ring(&self) -> bool {
         self.notifier.notify().is_ok_and(|listeners| listeners > 0)
     }

@@ -6,12 +6,15 @@ use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{BackpressureStrategy, ServiceName, SignalHandlingMode, ZeroCopySend, ipc};
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
-use iceoryx2::service::builder::publish_subscribe::{PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError};
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use ravenpose_wire::{CorrectedPose, ICEORYX2_VERSION, POSE_SERVICE, RavenState, STATE_SERVICE};
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
+use std::time::Duration;
 
 /// A message with its service.
 pub trait Message: ZeroCopySend + Copy + Debug + 'static {
@@ -70,35 +73,64 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
         prefix: settings.prefix.clone(),
     };
     let name = ServiceName::new(T::SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
-    let service = node
-        .service_builder(&name)
-        .publish_subscribe::<T>()
-        // Overflow drops the oldest: a slow reader never holds the writer up.
-        .enable_safe_overflow(true)
-        // A late reader gets the last message at once, and tells from its time how old it is.
-        .history_size(1)
-        .subscriber_max_buffer_size(MAX_DEPTH)
-        .subscriber_max_borrowed_samples(2)
-        .max_publishers(1)
-        .max_subscribers(T::MAX_READERS)
-        .max_nodes(T::MAX_READERS + 8)
-        .open_or_create()
-        .map_err(|cause| match cause {
-            PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
-                PublishSubscribeOpenError::IncompatibleTypes
-                | PublishSubscribeOpenError::IncompatibleMessagingPattern
-                | PublishSubscribeOpenError::IncompatibleAttributes
-                | PublishSubscribeOpenError::IncompatibleOverflowBehavior
-                | PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize
-                | PublishSubscribeOpenError::DoesNotSupportRequestedMinHistorySize
-                | PublishSubscribeOpenError::DoesNotSupportRequestedMinSubscriberBorrowedSamples
-                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfPublishers
-                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfSubscribers
-                | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfNodes,
-            ) => TransportError::Foreign { service: T::SERVICE, expected: T::TYPE, cause: format!("{cause:?}") },
-            _ => unusable(format!("{cause:?}")),
-        })?;
+    let service = retried(|| {
+        node.service_builder(&name)
+            .publish_subscribe::<T>()
+            // Overflow drops the oldest: a slow reader never holds the writer up.
+            .enable_safe_overflow(true)
+            // A late reader gets the last message at once, and tells from its time how old it is.
+            .history_size(1)
+            .subscriber_max_buffer_size(MAX_DEPTH)
+            .subscriber_max_borrowed_samples(2)
+            .max_publishers(1)
+            .max_subscribers(T::MAX_READERS)
+            .max_nodes(T::MAX_READERS + 8)
+            .open_or_create()
+    })
+    .map_err(|cause| match cause {
+        PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+            PublishSubscribeOpenError::IncompatibleTypes
+            | PublishSubscribeOpenError::IncompatibleMessagingPattern
+            | PublishSubscribeOpenError::IncompatibleAttributes
+            | PublishSubscribeOpenError::IncompatibleOverflowBehavior
+            | PublishSubscribeOpenError::DoesNotSupportRequestedMinBufferSize
+            | PublishSubscribeOpenError::DoesNotSupportRequestedMinHistorySize
+            | PublishSubscribeOpenError::DoesNotSupportRequestedMinSubscriberBorrowedSamples
+            | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfPublishers
+            | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfSubscribers
+            | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfNodes,
+        ) => TransportError::Foreign { service: T::SERVICE, expected: T::TYPE, cause: format!("{cause:?}") },
+        _ => unusable(format!("{cause:?}")),
+    })?;
     Ok(Opened { service, _node: node })
+}
+
+/// Tries for a second: another party may be creating or removing the same service at this moment.
+fn retried<R>(
+    mut open: impl FnMut() -> Result<R, PublishSubscribeOpenOrCreateError>,
+) -> Result<R, PublishSubscribeOpenOrCreateError> {
+    const TRIES: u32 = 200;
+    const PAUSE: Duration = Duration::from_millis(5);
+    for _ in 1..TRIES {
+        match open() {
+            Err(
+                PublishSubscribeOpenOrCreateError::SystemInFlux
+                | PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(
+                    PublishSubscribeCreateError::HangsInCreation
+                    | PublishSubscribeCreateError::IsBeingCreatedByAnotherInstance
+                    | PublishSubscribeCreateError::AlreadyExists,
+                )
+                | PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+                    PublishSubscribeOpenError::DoesNotExist
+                    | PublishSubscribeOpenError::HangsInCreation
+                    | PublishSubscribeOpenError::IsMarkedForDestruction
+                    | PublishSubscribeOpenError::ServiceInCorruptedState,
+                ),
+            ) => std::thread::sleep(PAUSE),
+            done => return done,
+        }
+    }
+    open()
 }
 
 /// The one publisher of a message type.

@@ -2,6 +2,9 @@
 
 use crate::TransportError;
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString};
+use std::time::Duration;
+
+const CREATION_TIMEOUT: Duration = Duration::from_millis(1);
 
 /// Prefix and root of the shared files. All parties that want to talk must agree on both; the defaults are those of iceoryx2, so
 /// that any iceoryx2 client finds us.
@@ -34,6 +37,9 @@ impl Settings {
         let bad = |what: &str, value: &str| TransportError::Settings { what: what.to_owned(), value: value.to_owned() };
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| bad("prefix", &self.prefix))?;
         config.global.set_root_path(&Path::new(self.root.as_bytes()).map_err(|_| bad("root", &self.root))?);
+        // How long iceoryx2 retries on a peer's files that it cannot open, also inside `send` and `receive` (another user's files, for
+        // one): half a second by default, far too long inside a controller. Opening retries by itself, see `link::retried`.
+        config.global.creation_timeout = CREATION_TIMEOUT;
         Ok(config)
     }
 }

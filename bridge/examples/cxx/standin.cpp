@@ -1,6 +1,6 @@
 // Stands in for RAVEN's control process: replays a file of full states at 1 kHz over the bridge, once, never wrapped round.
 //
-// usage: standin FILE [--seconds S] [--core N] [--priority P] [--wait-readers N] [--bell]
+// usage: standin FILE [--seconds S] [--core N] [--priority P] [--wait-readers N]
 // The file is what `ravenpose convert RUN FILE.rvs` writes (docs/statefile.md). Prints one line when done: what was sent.
 #include <pthread.h>
 #include <sched.h>
@@ -83,15 +83,14 @@ int main(int argc, char **argv) try {
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     const bool has_value = i + 1 < argc;
-    if (argument == "--bell") options.ring_bell = true;
-    else if (argument == "--seconds" && has_value) seconds = std::atof(argv[++i]);
+    if (argument == "--seconds" && has_value) seconds = std::atof(argv[++i]);
     else if (argument == "--core" && has_value) core = std::atoi(argv[++i]);
     else if (argument == "--priority" && has_value) priority = std::atoi(argv[++i]);
     else if (argument == "--wait-readers" && has_value) wait_readers = static_cast<uint32_t>(std::atoi(argv[++i]));
     else if (argument.rfind("--", 0) == 0 || !path.empty()) refuse("unknown argument " + argument);
     else path = argument;
   }
-  if (path.empty()) refuse("usage: standin FILE [--seconds S] [--core N] [--priority P] [--wait-readers N] [--bell]");
+  if (path.empty()) refuse("usage: standin FILE [--seconds S] [--core N] [--priority P] [--wait-readers N]");
   int64_t period_ns = 0;
   const auto states = read_states(path, period_ns);
   const auto wanted = static_cast<uint64_t>(seconds * 1e9 / static_cast<double>(period_ns));

@@ -1,6 +1,6 @@
 //! `ravenpose check`: is this machine ready for hard real time, and what to do if not.
 
-use ravenpose::check::{Level, Question, examine, measure_wakeup};
+use ravenpose::check::{Finding, Level, Question, examine, measure_wakeup};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -12,28 +12,22 @@ pub(crate) fn run(core: Option<usize>, priority: i32, spins: bool, seconds: u64)
     if !(1..=95).contains(&priority) {
         return Err(format!("--priority {priority} is outside 1 to 95 (RAVEN's controller runs at 96)"));
     }
-    let findings = examine(&Question { sysroot: Path::new("/"), core, priority, spins });
-    let mut worst = 0;
-    for finding in &findings {
-        let mark = match finding.level {
-            Level::Ok => "ok  ",
-            Level::Warn => "warn",
-            Level::Fail => "FAIL",
-        };
-        worst = worst.max(finding.level as u8);
-        println!("{mark}  {:20} {}", finding.id, finding.found);
-        if let Some(remedy) = &finding.remedy {
-            println!("      {:20} -> {remedy}", "");
-        }
-    }
+    let mut findings = examine(&Question { sysroot: Path::new("/"), core, priority, spins });
     if seconds > 0 {
-        match measure_wakeup(Duration::from_secs(seconds), core, priority) {
-            Ok(wakeup) => println!("\n{wakeup}"),
-            Err(cause) => println!("\nwake-up latency could not be measured: {cause}"),
-        }
+        let wakeup = measure_wakeup(Duration::from_secs(seconds), core, priority);
+        findings.push(wakeup.map_err(|cause| format!("wake-up latency cannot be measured: {cause}; use --seconds 0"))?.finding());
     }
-    let fails = findings.iter().filter(|finding| matches!(finding.level, Level::Fail)).count();
-    let warns = findings.iter().filter(|finding| matches!(finding.level, Level::Warn)).count();
-    println!("\n{fails} requirements not met, {warns} warnings, {} checks", findings.len());
-    Ok(if fails == 0 { ExitCode::SUCCESS } else { ExitCode::from(NOT_READY) })
+    for finding in &findings {
+        show(finding);
+    }
+    let count = |level: Level| findings.iter().filter(|finding| finding.level == level).count();
+    println!("\n{} requirements not met, {} warnings, {} checks", count(Level::Fail), count(Level::Warn), findings.len());
+    Ok(if count(Level::Fail) == 0 { ExitCode::SUCCESS } else { ExitCode::from(NOT_READY) })
+}
+
+fn show(finding: &Finding) {
+    println!("{:4}  {:18} {}", finding.level.to_string(), finding.id, finding.found);
+    if let Some(remedy) = &finding.remedy {
+        println!("      {:18} -> {remedy}", "");
+    }
 }

@@ -1,6 +1,6 @@
 //! `ravenpose`: the command line for everything but the real-time service.
 
-// mod check;
+mod check;
 mod convert;
 mod infer;
 mod output;
@@ -78,7 +78,7 @@ fn main() -> ExitCode {
         Command::Infer { model, input, out, weights } => infer::run(&model, &input, &out, &weights),
         Command::Convert { input, out, arm } => convert::run(&input, &out, &arm),
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
-        Command::Check { .. } => Err("not in this build".to_owned()),
+        Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };
     match done {
         Ok(code) => code,

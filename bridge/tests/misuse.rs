@@ -1,0 +1,157 @@
+//! Wrong use of the C interface gives a code, never undefined behaviour.
+
+use ravenpose_bridge::*;
+use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
+use std::ffi::{CStr, CString, c_char};
+use std::ptr::{null, null_mut};
+
+fn options(prefix: &CString) -> Options {
+    Options {
+        abi_version: RAVENPOSE_ABI_VERSION,
+        state_size: size_of::<RavenState>() as u32,
+        pose_size: size_of::<CorrectedPose>() as u32,
+        queue_depth: 0,
+        reserved: [0; 2],
+        prefix: prefix.as_ptr(),
+        root: null(),
+    }
+}
+
+fn prefix(name: &str) -> CString {
+    CString::new(format!("rpmis{name}{}_", std::process::id())).expect("no NUL")
+}
+
+#[test]
+fn null_is_refused_everywhere() {
+    let name = prefix("null");
+    let mut publisher: *mut Publisher = null_mut();
+    let mut reader: *mut PoseReader = null_mut();
+    let mut state: *mut RavenState = null_mut();
+    let mut pose = CorrectedPose::new();
+    let mut um = [0.0; 3];
+    // SAFETY: null is what is being tested; everything else is valid.
+    unsafe {
+        let missing = Code::Null as i32;
+        assert_eq!(ravenpose_publisher_open(null(), &mut publisher, null_mut(), 0), missing);
+        assert_eq!(ravenpose_publisher_open(&options(&name), null_mut(), null_mut(), 0), missing);
+        assert_eq!(ravenpose_publisher_loan(null_mut(), &mut state), missing);
+        assert_eq!(ravenpose_publisher_send(null_mut()), missing);
+        assert_eq!(ravenpose_publisher_publish(null_mut(), &RavenState::new()), missing);
+        assert_eq!(ravenpose_publisher_readers(null()), 0);
+        ravenpose_publisher_close(null_mut());
+        ravenpose_publisher_close(&mut publisher);
+        assert_eq!(ravenpose_pose_reader_open(null(), &mut reader, null_mut(), 0), missing);
+        assert_eq!(ravenpose_pose_reader_take(null_mut(), &mut pose), missing);
+        assert_eq!(ravenpose_pose_reader_next(null_mut(), &mut pose), missing);
+        assert_eq!(ravenpose_pose_reader_wait(null_mut(), 0, &mut pose), missing);
+        ravenpose_pose_reader_close(null_mut());
+        ravenpose_pose_reader_close(&mut reader);
+        assert_eq!(ravenpose_state_init(null_mut()), missing);
+        assert_eq!(ravenpose_position(null(), 0, 0, um.as_mut_ptr()), missing);
+        assert_eq!(ravenpose_position(&pose, 0, 0, null_mut()), missing);
+    }
+}
+
+#[test]
+fn another_version_is_refused_with_both_versions_in_the_message() {
+    let name = prefix("version");
+    for change in 0..3 {
+        let mut wrong = options(&name);
+        match change {
+            0 => wrong.abi_version += 1,
+            1 => wrong.state_size -= 8,
+            _ => wrong.pose_size += 8,
+        }
+        let mut publisher = null_mut();
+        let mut message = [1 as c_char; 512];
+        // SAFETY: valid pointers, and the buffer has the stated size.
+        let text = unsafe {
+            assert_eq!(ravenpose_publisher_open(&wrong, &mut publisher, message.as_mut_ptr(), message.len()), Code::Version as i32);
+            assert!(publisher.is_null());
+            CStr::from_ptr(message.as_ptr()).to_str().expect("UTF-8")
+        };
+        assert!(text.contains("version mismatch") && text.contains("ABI 1"), "{text}");
+        assert!(!text.contains('\n'));
+    }
+}
+
+#[test]
+fn a_short_message_buffer_is_filled_and_terminated() {
+    let name = prefix("short");
+    let mut wrong = options(&name);
+    wrong.abi_version = 99;
+    let mut reader = null_mut();
+    let mut message = [7 as c_char; 12];
+    // SAFETY: valid pointers, and the buffer is stated shorter than it is.
+    unsafe { ravenpose_pose_reader_open(&wrong, &mut reader, message.as_mut_ptr(), 8) };
+    assert_eq!((message[7], message[8]), (0, 7));
+}
+
+#[test]
+fn one_publisher_only_and_its_place_is_free_again_after_close() {
+    let name = prefix("one");
+    let (mut first, mut second) = (null_mut(), null_mut());
+    let mut message = [0 as c_char; 512];
+    // SAFETY: valid pointers; handles are closed once.
+    unsafe {
+        assert_eq!(ravenpose_publisher_open(&options(&name), &mut first, null_mut(), 0), 0);
+        assert_eq!(ravenpose_publisher_open(&options(&name), &mut second, message.as_mut_ptr(), message.len()), Code::Full as i32);
+        assert!(second.is_null());
+        assert!(CStr::from_ptr(message.as_ptr()).to_string_lossy().contains("raven/state"));
+        assert_eq!(ravenpose_publisher_send(first), Code::Loan as i32, "send without loan");
+        let (mut state, mut again) = (null_mut(), null_mut());
+        assert_eq!(ravenpose_publisher_loan(first, &mut state), 0);
+        assert_eq!(ravenpose_publisher_loan(first, &mut again), 0);
+        assert_eq!(state, again, "the same place until it is sent");
+        assert_eq!((*state).sequence, 1);
+        // Closing with a loan out is allowed.
+        ravenpose_publisher_close(&mut first);
+        assert!(first.is_null());
+        ravenpose_publisher_close(&mut first);
+        assert_eq!(ravenpose_publisher_open(&options(&name), &mut second, null_mut(), 0), 0);
+        ravenpose_publisher_close(&mut second);
+    }
+}
+
+#[test]
+fn a_prefix_that_is_no_file_name_is_refused() {
+    let name = CString::new("../evil").expect("no NUL");
+    let mut publisher = null_mut();
+    // SAFETY: valid pointers.
+    assert_eq!(unsafe { ravenpose_publisher_open(&options(&name), &mut publisher, null_mut(), 0) }, Code::Argument as i32);
+}
+
+#[test]
+fn the_consumer_rule_gives_raw_unless_everything_is_right() {
+    let mut good = CorrectedPose::new();
+    good.source_time_ns = 1_000_000_000;
+    good.arm[0].status = ArmStatus::Valid as u32;
+    good.arm[0].raw_position_um = [1.0, 2.0, 3.0];
+    good.arm[0].corrected_position_um = [4.0, 5.0, 6.0];
+    good.seal(5);
+    let rule = |pose: &CorrectedPose, arm: u32, now: i64| {
+        let mut um = [0.0; 3];
+        // SAFETY: valid pointers.
+        let code = unsafe { ravenpose_position(pose, arm, now, um.as_mut_ptr()) };
+        (code, um)
+    };
+    assert_eq!(rule(&good, 0, 1_004_999_999), (Code::Ok as i32, [4.0, 5.0, 6.0]));
+    assert_eq!(rule(&good, 0, 1_005_000_000), (Code::Raw as i32, [1.0, 2.0, 3.0]), "too old");
+    assert_eq!(rule(&good, 2, 1_000_000_000).0, Code::Argument as i32);
+    let mut fallback = good;
+    fallback.arm[0].status = ArmStatus::Fallback as u32;
+    assert_eq!(rule(&fallback, 0, 1_000_000_001), (Code::Raw as i32, [1.0, 2.0, 3.0]));
+    let mut torn = good;
+    torn.guard_tail = 4;
+    assert_eq!(rule(&torn, 0, 1_000_000_001).0, Code::Torn as i32);
+}
+
+#[test]
+fn every_code_has_a_text() {
+    for code in -12..=3 {
+        // SAFETY: a static text.
+        let text = unsafe { CStr::from_ptr(ravenpose_error_text(code)) }.to_str().expect("UTF-8");
+        assert!(!text.is_empty());
+        assert_eq!(text == "unknown code", !(-11..=2).contains(&code), "{code}");
+    }
+}

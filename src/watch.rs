@@ -1,0 +1,258 @@
+//! The ordinary thread beside the loop: watchdog, log, statistics, and an eye on the link.
+
+use crate::config::Config;
+use crate::histogram::{Collector, Histograms};
+use crate::report::{Log, Stats};
+use crate::say;
+use crate::shared::{Event, EventReceiver, Shared};
+use crate::writer::Writer;
+use ravenpose_transport::{Message, Probe};
+use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, RavenState, flag, flag_names};
+use sd_notify::NotifyState;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::{Duration, Instant};
+
+/// The arms' names, as the configuration has them.
+pub const NAMES: [&str; ARMS] = ["gold", "green"];
+/// How often the ordinary thread looks.
+pub const TICK: Duration = Duration::from_millis(50);
+/// Ticks without a heartbeat after which the loop is stuck: 200 ms on a real-time machine. Counted in ticks of this thread, so that
+/// a stop of the whole process is not taken for one.
+const STUCK_TICKS: u32 = 4;
+/// The same where the loop has no real-time rights and may be held up by anything.
+const STUCK_TICKS_DEGRADED: u32 = 100;
+/// How often statistics are written and the link is probed.
+const SECOND: Duration = Duration::from_secs(1);
+/// How long the last files may take.
+const WRITE_MAX: Duration = Duration::from_millis(500);
+
+/// The ordinary thread's view of the running service.
+pub struct Watch {
+    /// What the loop shows and is told.
+    pub shared: Arc<Shared>,
+    collector: Collector,
+    events: EventReceiver,
+    interval: Histograms,
+    total: Histograms,
+    writer: Writer,
+    stats_path: PathBuf,
+    names: [String; ARMS],
+    started: Instant,
+    interval_length: Duration,
+    interval_began: Instant,
+    lines: Lines,
+    heartbeat: u64,
+    still: u32,
+    stuck_ticks: u32,
+    probe: Probe,
+    unreachable: u32,
+    silent_since: Option<Instant>,
+    silence_explained: bool,
+}
+
+impl Watch {
+    /// Prepares everything; `names` are the models' as shown in the statistics, `realtime` tells whether the loop has its rights.
+    ///
+    /// # Errors
+    /// One line, when shared memory or a thread cannot be had.
+    pub fn new(
+        config: &Config,
+        shared: Arc<Shared>,
+        collector: Collector,
+        events: EventReceiver,
+        names: [String; ARMS],
+        realtime: bool,
+    ) -> Result<Self, String> {
+        let log = config.histogram_dir.as_deref().and_then(open_log);
+        if let Err(cause) = std::fs::create_dir_all(&config.runtime_dir) {
+            say(&format!("{}: statistics cannot be written here ({cause}); set report.runtime_dir", config.runtime_dir.display()));
+        }
+        let stats_path = config.runtime_dir.join("stats.json");
+        Ok(Self {
+            shared,
+            collector,
+            events,
+            interval: Histograms::new(),
+            total: Histograms::new(),
+            writer: Writer::start(stats_path.clone(), log)
+                .map_err(|cause| format!("the writer's thread cannot be started: {cause}"))?,
+            stats_path,
+            names,
+            started: Instant::now(),
+            interval_length: Duration::from_secs(config.interval_s),
+            interval_began: Instant::now(),
+            lines: Lines::default(),
+            heartbeat: 0,
+            still: 0,
+            stuck_ticks: if realtime { STUCK_TICKS } else { STUCK_TICKS_DEGRADED },
+            probe: Probe::open(&config.transport).map_err(|error| error.to_string())?,
+            unreachable: 0,
+            silent_since: None,
+            silence_explained: false,
+        })
+    }
+
+    /// Where the statistics are.
+    pub fn stats_path(&self) -> &Path {
+        &self.stats_path
+    }
+
+    /// One look: every [`TICK`].
+    pub fn tick(&mut self) {
+        self.check_heartbeat();
+        while let Some(event) = self.events.dequeue() {
+            self.lines.take(&event);
+        }
+        if self.lines.due() {
+            self.lines.print();
+            self.collect(None);
+            self.check_link();
+            self.write_stats();
+            if self.interval_began.elapsed() >= self.interval_length {
+                self.write_log();
+            }
+        }
+    }
+
+    /// Feeds the watchdog while the heartbeat moves; ends the process when it has stood still for too long, so that the service
+    /// starts anew whether or not somebody outside watches.
+    fn check_heartbeat(&mut self) {
+        let heartbeat = self.shared.heartbeat.load(Relaxed);
+        if heartbeat != self.heartbeat || self.shared.reopen.load(Relaxed) {
+            self.heartbeat = heartbeat;
+            self.still = 0;
+            notify(&[NotifyState::Watchdog]);
+            return;
+        }
+        self.still += 1;
+        if self.still >= self.stuck_ticks {
+            say(&format!(
+                "the loop is stuck: no turn for {} ms; ending, so that it is started anew",
+                TICK.as_millis() * u128::from(self.still)
+            ));
+            std::process::abort();
+        }
+    }
+
+    fn collect(&mut self, last: Option<&Histograms>) {
+        let (interval, total) = (&mut self.interval, &mut self.total);
+        let mut add = |set: &Histograms| {
+            interval.add(set);
+            total.add(set);
+        };
+        self.collector.collect(&mut add);
+        last.map(add);
+    }
+
+    /// Are our ports among those that a newcomer finds? And does a publisher's data reach us?
+    fn check_link(&mut self) {
+        let (publishers, readers) = self.probe.count::<RavenState>();
+        let (poses, _) = self.probe.count::<CorrectedPose>();
+        self.unreachable = if readers > 0 && poses > 0 { 0 } else { self.unreachable + 1 };
+        if self.unreachable >= 2 {
+            self.unreachable = 0;
+            say("the shared files were removed under the service (RemoveIPC, a tmp cleaner?); opening the link anew");
+            self.shared.reopen.store(true, Relaxed);
+        }
+        let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
+        let never = self.shared.counters()[1] == 0;
+        if publishers == 0 || !(stale || never) {
+            self.silent_since = None;
+            self.silence_explained = false;
+        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed() > 2 * SECOND && !self.silence_explained {
+            self.silence_explained = true;
+            say(&format!(
+                "a publisher of {} is connected but its states do not arrive; it is stopped, or runs as another user: all parties must run as the same user",
+                RavenState::SERVICE
+            ));
+        }
+    }
+
+    fn write_stats(&self) {
+        let stats = Stats::collect(&self.shared, &self.total, self.started.elapsed(), &self.names);
+        if let Ok(bytes) = serde_json::to_vec(&stats) {
+            self.writer.stats(bytes);
+        }
+    }
+
+    fn write_log(&mut self) {
+        if self.writer.log(&self.interval, &self.total, self.interval_began.elapsed()) {
+            self.interval.clear();
+            self.interval_began = Instant::now();
+        }
+    }
+
+    /// The end: what is left to say and to write.
+    pub fn finish(mut self, last: Option<&Histograms>) {
+        while let Some(event) = self.events.dequeue() {
+            self.lines.take(&event);
+        }
+        self.lines.print();
+        self.collect(last);
+        self.write_log();
+        self.write_stats();
+        if !self.writer.finish(WRITE_MAX) {
+            say("the last histograms could not be written in time");
+        }
+    }
+}
+
+fn open_log(dir: &Path) -> Option<Log> {
+    Log::create(dir)
+        .map_err(|cause| say(&format!("{}: histograms cannot be written here ({cause}); set report.histogram_dir", dir.display())))
+        .ok()
+}
+
+/// Tells systemd; without it this does nothing, and a failure must not end the service.
+pub fn notify(states: &[NotifyState]) {
+    let _ = sd_notify::notify(states);
+}
+
+/// At most one line per kind of event and second, with a count of what it stands for.
+#[derive(Default)]
+struct Lines {
+    last: [Option<Event>; Event::KINDS],
+    counts: [u64; Event::KINDS],
+    printed: Option<Instant>,
+}
+
+impl Lines {
+    fn take(&mut self, event: &Event) {
+        self.last[event.kind()] = Some(*event);
+        self.counts[event.kind()] += 1;
+    }
+
+    fn due(&self) -> bool {
+        self.printed.is_none_or(|printed| printed.elapsed() >= SECOND)
+    }
+
+    fn print(&mut self) {
+        self.printed = Some(Instant::now());
+        for (last, count) in self.last.iter_mut().zip(&mut self.counts) {
+            if let Some(event) = last.take() {
+                let repeated = if *count > 1 { format!(" ({count} such events in the last second)") } else { String::new() };
+                say(&format!("{}{repeated}", describe(&event)));
+            }
+            *count = 0;
+        }
+    }
+}
+
+fn describe(event: &Event) -> String {
+    match *event {
+        Event::Arm { arm, status, flags, sequence } => {
+            let names: Vec<_> = flag_names(flags).collect();
+            format!("{} arm: {} [{}] at state {sequence}", NAMES[arm], ArmStatus::name(status), names.join(" "))
+        }
+        Event::Source { id, sequence } => format!("control process {id:016x} from state {sequence}"),
+        Event::Lost { total, sequence } => format!("states missing before {sequence}; {total} in all"),
+        Event::Refused { total } => {
+            format!("messages refused (other layout, torn, or not on this machine's CLOCK_MONOTONIC); {total} in all")
+        }
+        Event::Late { took_ns, sequence } => format!("state {sequence} took {:.1} us, beyond the budget", took_ns as f64 / 1000.0),
+        Event::Link { receive, send } => format!("link failures: {receive} receiving, {send} sending"),
+        Event::Reopened => "the link was opened anew".to_owned(),
+    }
+}

@@ -1,0 +1,88 @@
+//! The systemd protocol, with a notification socket of our own.
+
+mod common;
+#[path = "common/service.rs"]
+mod service;
+
+use service::{World, publish_forever, role};
+use std::os::unix::net::UnixDatagram;
+use std::os::unix::process::ExitStatusExt;
+use std::time::{Duration, Instant};
+
+const CONFIG: &str = "allow_untrained = true\nallow_degraded = true";
+
+struct Socket(UnixDatagram);
+
+impl Socket {
+    /// The next message within `timeout`.
+    fn hear(&self, timeout: Duration) -> Option<String> {
+        let mut bytes = [0; 4096];
+        self.0.set_read_timeout(Some(timeout)).expect("timeout");
+        self.0.recv(&mut bytes).ok().map(|size| String::from_utf8_lossy(&bytes[..size]).into_owned())
+    }
+
+    fn hear_until(&self, wanted: &str, within: Duration) -> Duration {
+        let begun = Instant::now();
+        while begun.elapsed() < within {
+            if self.hear(Duration::from_millis(100)).is_some_and(|text| text.contains(wanted)) {
+                return begun.elapsed();
+            }
+        }
+        panic!("{wanted} did not come within {within:?}");
+    }
+}
+
+fn start(world: &World, arguments: &[&str]) -> (Socket, service::Process) {
+    let path = world.dir.0.join("notify");
+    let socket = Socket(UnixDatagram::bind(&path).expect("socket"));
+    let config = world.config(CONFIG);
+    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
+    let child = world.service(&config).args(arguments).env("NOTIFY_SOCKET", &path).stderr(log).spawn().expect("service");
+    (socket, service::Process(child))
+}
+
+#[test]
+fn ready_then_watchdog_while_the_heartbeat_moves_then_stopping() {
+    let world = World::new("ready");
+    let (socket, mut service) = start(&world, &[]);
+    socket.hear_until("READY=1", Duration::from_secs(20));
+    // Also without any robot: the loop is healthy.
+    for _ in 0..10 {
+        socket.hear_until("WATCHDOG=1", Duration::from_secs(2));
+    }
+    service.signal(libc::SIGTERM);
+    socket.hear_until("STOPPING=1", Duration::from_secs(2));
+    assert_eq!(service.end().code(), Some(0));
+}
+
+#[test]
+fn a_stuck_loop_is_no_longer_fed() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let world = World::new("stuck");
+    // After 200 messages: busy for an hour.
+    let (socket, mut service) = start(&world, &["--test-hook", "200:1:3600000000"]);
+    socket.hear_until("READY=1", Duration::from_secs(20));
+    let _publisher = world.role("a_stuck_loop_is_no_longer_fed", "publisher");
+    // It ends itself within 200 ms of its own time, or systemd would, for it is fed no more.
+    let status = service.end();
+    assert_eq!(status.signal(), Some(libc::SIGABRT), "{}", world.log());
+    assert!(world.log().contains("the loop is stuck"), "{}", world.log());
+    let mut fed = 0;
+    while socket.hear(Duration::from_millis(20)).is_some_and(|text| text.contains("WATCHDOG=1")) {
+        fed += 1;
+    }
+    println!("{fed} feeds in all");
+}
+
+#[test]
+fn a_refused_start_never_says_ready() {
+    let world = World::new("refused");
+    let path = world.dir.0.join("notify");
+    let socket = Socket(UnixDatagram::bind(&path).expect("socket"));
+    let config = world.dir.file("bad.toml", "nonsense = 1\n");
+    let output = world.service(&config).env("NOTIFY_SOCKET", &path).output().expect("service");
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(socket.hear(Duration::from_millis(100)), None);
+}

@@ -1,0 +1,286 @@
+//! Real processes, real shared memory, real signals: killed and restarted in any order, stopped at any phase, started twice.
+//!
+//! `RAVENPOSE_KILLS` sets the number of kills (50; `make faults` does 10,000).
+
+mod common;
+#[path = "common/service.rs"]
+mod service;
+
+use ravenpose_transport::{Reader, Settings, now_ns, sleep_until_ns};
+use ravenpose_wire::{ArmStatus, CorrectedPose, flag};
+use service::{Process, World, publish_forever, role, whole};
+use std::io::{BufRead, BufReader};
+use std::time::{Duration, Instant};
+
+const VALID: u32 = ArmStatus::Valid as u32;
+const POSE_AGE_MAX_NS: i64 = 5_000_000;
+const CONFIG: &str = "allow_untrained = true\nallow_degraded = true";
+
+fn kills() -> u64 {
+    std::env::var("RAVENPOSE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(50)
+}
+
+/// A client that says `fresh` at its first fresh pose and `WRONG ...` at any fault.
+fn client() -> ! {
+    let reader: Reader<CorrectedPose> = Reader::open(&Settings::from_env(), 64).expect("reader");
+    let mut said = false;
+    let mut last = 0;
+    loop {
+        if let Some(pose) = reader.next().expect("pose read") {
+            let age = now_ns() - pose.source_time_ns;
+            if !whole(&pose) {
+                println!("WRONG fields: {pose:?}");
+            }
+            if pose.arm[0].status == VALID && pose.publish_time_ns - pose.source_time_ns > POSE_AGE_MAX_NS + 1_000_000 {
+                println!("WRONG: a stale state was published as valid: {pose:?}");
+            }
+            if age < POSE_AGE_MAX_NS && !said {
+                said = true;
+                println!("fresh");
+            }
+            if pose.sequence == last {
+                println!("WRONG: sequence {last} twice");
+            }
+            last = pose.sequence;
+        } else {
+            sleep_until_ns(now_ns() + 100_000);
+        }
+    }
+}
+
+/// Reads a client's words until it says `fresh`; anything wrong ends the test.
+fn hears_fresh(client: &mut Process) -> BufReader<std::process::ChildStdout> {
+    let mut output = BufReader::new(client.0.stdout.take().expect("piped"));
+    let mut line = String::new();
+    loop {
+        line.clear();
+        assert!(output.read_line(&mut line).expect("client's words") > 0, "the client ended");
+        assert!(!line.contains("WRONG"), "{line}");
+        // The harness prints the test's name in front of the first line.
+        if line.trim_end().ends_with("fresh") {
+            return output;
+        }
+    }
+}
+
+/// Watches the poses from this process; returns how long it took until a fresh one with another source or service came, and until valid.
+struct Monitor {
+    reader: Reader<CorrectedPose>,
+    fresh: Option<i64>,
+    valid: Option<i64>,
+    since: i64,
+}
+
+impl Monitor {
+    fn watch_ms(&mut self, duration: i64) {
+        let end = now_ns() + duration * 1_000_000;
+        while now_ns() < end {
+            self.look();
+            sleep_until_ns(now_ns() + 200_000);
+        }
+    }
+
+    fn look(&mut self) {
+        while let Some(pose) = self.reader.next().expect("pose read") {
+            assert!(whole(&pose), "torn or mixed: {pose:?}");
+            for arm in &pose.arm {
+                if arm.status == VALID {
+                    assert!(
+                        pose.publish_time_ns - pose.source_time_ns < POSE_AGE_MAX_NS + 1_000_000,
+                        "stale presented as fresh: {pose:?}"
+                    );
+                }
+            }
+            let now = now_ns();
+            if pose.source_time_ns > self.since && now - pose.source_time_ns < POSE_AGE_MAX_NS {
+                self.fresh = self.fresh.or(Some(now));
+                if pose.arm.iter().all(|arm| arm.status == VALID) {
+                    self.valid = self.valid.or(Some(now));
+                }
+            }
+        }
+    }
+
+    fn restart(&mut self) {
+        self.look();
+        self.since = now_ns();
+        self.fresh = None;
+        self.valid = None;
+    }
+}
+
+#[test]
+fn fifty_random_kills_of_any_process_are_survived() {
+    match role().as_deref() {
+        Some("publisher") => publish_forever(),
+        Some("client") => client(),
+        _ => {}
+    }
+    const TEST: &str = "fifty_random_kills_of_any_process_are_survived";
+    let world = World::new("kill");
+    let config = world.config(CONFIG);
+    let mut service = world.start(&config, &[]);
+    let mut publisher = world.role(TEST, "publisher");
+    let mut client = world.role(TEST, "client");
+    let mut client_output = hears_fresh(&mut client);
+    let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
+    monitor.watch_ms(300);
+    let baseline = common::shared_files(&world.settings.prefix).len();
+    let seed = std::env::var("RAVENPOSE_KILL_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_261_121);
+    println!("seed {seed} (RAVENPOSE_KILL_SEED), {} shared files at first", baseline);
+    let mut rng = common::Rng(seed);
+    let (mut slowest_fresh, mut slowest_valid, mut most_files) = (0, 0, baseline);
+    for kill in 0..kills() {
+        let victim = rng.below(3);
+        let pause = Duration::from_millis(rng.below(50));
+        monitor.look();
+        match victim {
+            0 => {
+                publisher.kill();
+                std::thread::sleep(pause);
+                monitor.restart();
+                publisher = world.role(TEST, "publisher");
+            }
+            1 => {
+                service.kill();
+                std::thread::sleep(pause);
+                monitor.restart();
+                service = world.start(&config, &[]);
+            }
+            _ => {
+                client.kill();
+                nothing_wrong(&mut client_output);
+                std::thread::sleep(pause);
+                let begun = Instant::now();
+                client = world.role(TEST, "client");
+                client_output = hears_fresh(&mut client);
+                assert!(begun.elapsed() < Duration::from_secs(1), "kill {kill}: the client took {:?}", begun.elapsed());
+                monitor.restart();
+            }
+        }
+        let begun = monitor.since;
+        while monitor.valid.is_none() {
+            monitor.watch_ms(1);
+            assert!(now_ns() - begun < 3_000_000_000, "kill {kill} of {victim}: never valid again\n{}", world.log());
+        }
+        let fresh = monitor.fresh.expect("fresh before valid") - begun;
+        assert!(fresh < 1_000_000_000, "kill {kill} of {victim}: reconnected only after {} ms", fresh / 1_000_000);
+        slowest_fresh = slowest_fresh.max(fresh);
+        slowest_valid = slowest_valid.max(monitor.valid.expect("valid") - begun);
+        most_files = most_files.max(common::shared_files(&world.settings.prefix).len());
+        monitor.watch_ms(5 + rng.below(40) as i64);
+    }
+    println!(
+        "{} kills: slowest reconnect {} ms, slowest return to valid {} ms (with the start of the process), shared files {baseline} at first, {most_files} at most",
+        kills(),
+        slowest_fresh / 1_000_000,
+        slowest_valid / 1_000_000
+    );
+    // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
+    assert!(most_files <= 2 * baseline + 4, "leftovers grow: {most_files} from {baseline}");
+    client.kill();
+    nothing_wrong(&mut client_output);
+}
+
+/// Reads what a killed client still had said.
+fn nothing_wrong(output: &mut BufReader<std::process::ChildStdout>) {
+    let mut rest = String::new();
+    std::io::Read::read_to_string(output, &mut rest).expect("client's last words");
+    assert!(!rest.contains("WRONG"), "{rest}");
+}
+
+#[test]
+fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    const TEST: &str = "every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing";
+    let mut rng = common::Rng(42);
+    for signal in [libc::SIGTERM, libc::SIGINT, libc::SIGHUP] {
+        let world = World::new(&format!("stop{signal}"));
+        let config = world.config(CONFIG);
+        let mut service = world.start(&config, &[]);
+        let publisher = world.role(TEST, "publisher");
+        let reader = world.poses();
+        let mut last = None;
+        let mut seen = 0;
+        let begun = Instant::now();
+        let wanted = 150 + rng.below(100);
+        while seen < wanted {
+            assert!(begun.elapsed() < Duration::from_secs(10), "poses come\n{}", world.log());
+            if reader.next().expect("pose").is_some() {
+                seen += 1;
+            }
+        }
+        std::thread::sleep(Duration::from_micros(rng.below(1000)));
+        let asked = Instant::now();
+        service.signal(signal);
+        let status = service.end();
+        println!("signal {signal}: ended after {} ms", asked.elapsed().as_millis());
+        assert_eq!(status.code(), Some(0));
+        while let Some(pose) = reader.next().expect("pose") {
+            last = Some(pose);
+        }
+        let last = last.expect("a last message");
+        assert!(last.arm.iter().all(|arm| arm.flags & flag::STOPPING != 0 && arm.correction_um == [0.0; 3]), "{last:?}");
+        for stage in ["total", "input_to_output", "inference"] {
+            let hgrm = std::fs::read_to_string(world.dir.0.join(format!("histograms/{stage}.hgrm"))).expect("histogram");
+            assert!(hgrm.contains("#[Max"), "{hgrm}");
+        }
+        drop(publisher);
+        drop(reader);
+        // The publisher was killed: whoever comes next cleans up after it.
+        drop(ravenpose_transport::Probe::open(&world.settings).expect("a newcomer"));
+        let left: Vec<_> = common::shared_files(&world.settings.prefix)
+            .into_iter()
+            .filter(|path| !path.to_string_lossy().ends_with(".global_mgmt"))
+            .collect();
+        assert!(left.is_empty(), "left in shared memory: {left:?}");
+    }
+}
+
+#[test]
+fn a_second_service_is_refused_and_the_first_lives_on() {
+    let world = World::new("twice");
+    let config = world.config(CONFIG);
+    let mut first = world.start(&config, &[]);
+    let second = world.service(&config).output().expect("the second ends");
+    let words = String::from_utf8_lossy(&second.stderr);
+    assert_eq!(second.status.code(), Some(2), "{words}");
+    assert!(words.lines().last().is_some_and(|line| line.contains("raven/pose") && line.contains("no free place")), "{words}");
+    assert!(first.0.try_wait().expect("status").is_none(), "the first lives on");
+}
+
+#[test]
+fn a_service_whose_files_were_removed_opens_its_link_anew() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    const TEST: &str = "a_service_whose_files_were_removed_opens_its_link_anew";
+    let world = World::new("removed");
+    let config = world.config(CONFIG);
+    let _service = world.start(&config, &[]);
+    let mut publisher = world.role(TEST, "publisher");
+    let wait_for_poses = |what: &str| {
+        let begun = Instant::now();
+        // A newcomer each time: the old reader may hang on the dead service.
+        loop {
+            if let Ok(reader) = Reader::<CorrectedPose>::open(&world.settings, 1) {
+                std::thread::sleep(Duration::from_millis(50));
+                if let Ok(Some(pose)) = reader.latest()
+                    && now_ns() - pose.source_time_ns < POSE_AGE_MAX_NS
+                {
+                    return;
+                }
+            }
+            assert!(begun.elapsed() < Duration::from_secs(15), "{what}\n{}", world.log());
+        }
+    };
+    wait_for_poses("poses at first");
+    publisher.kill();
+    common::remove_shared_memory(&world.settings.prefix);
+    let _ = std::fs::remove_dir_all(&world.settings.root);
+    let _publisher = world.role(TEST, "publisher");
+    wait_for_poses("poses after the files were removed");
+    assert!(world.log().contains("opening the link anew"), "{}", world.log());
+}
