@@ -7,6 +7,7 @@ BUILD := build
 STAGE := $(CURDIR)/$(BUILD)/stage
 VERSION := 0.1.0
 CARGO ?= cargo
+PYTHON3 ?= python3
 # One profile for everything: every further one builds tract once more.
 CARGO_FLAGS := --release --locked
 CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
@@ -14,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci faults clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci faults lint clean
 
 all: build offline examples
 
@@ -55,6 +56,36 @@ examples: stage
 # RUN=FILE plays a recording of your own.
 demo: offline examples
 	bridge/examples/demo.sh $(RUN)
+
+# The official iceoryx2 package for the independent client, and CMake for the packaging test.
+venv: $(BUILD)/venv/.done
+$(BUILD)/venv/.done: tests/python/requirements.txt
+	mkdir -p $(BUILD)
+	$(PYTHON3) -m venv $(BUILD)/venv
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -r tests/python/requirements.txt
+	touch $@
+
+# Ends with a line "N passed, N failed".
+test: offline examples venv
+	tests/run.sh $(STAGE) $(PYTHON)
+
+# 10,000 kills and restarts, and a hundred million cycles of mixed faults: hours.
+faults: build
+	RAVENPOSE_KILLS=10000 $(CARGO) test $(CARGO_FLAGS) --workspace --test processes -- --nocapture fifty_random_kills
+	RAVENPOSE_FAULT_CYCLES=100000000 $(CARGO) test $(CARGO_FLAGS) --workspace --test faults -- --nocapture a_million_cycles
+
+# Five minutes: the network beside tract, and input to output through shared memory, in one run.
+bench-ci: build
+	target/release/ravenpose-bench ci
+
+bench: build
+	target/release/ravenpose-bench full
+
+lint:
+	$(CARGO) fmt --all --check
+	cd offline && $(CARGO) fmt --all --check
+	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
+	cd offline && $(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 
 clean:
 	rm -rf $(BUILD) target

@@ -113,6 +113,26 @@ impl Card {
         }
         Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, golden })
     }
+
+    /// Golden pairs are taken from training, so one outside of the trained range shows that the range is of another feature order
+    /// or in other units, which the network's outputs alone cannot show.
+    ///
+    /// # Errors
+    /// [`CardError::Numbers`].
+    pub fn check_range(&self) -> Result<(), CardError> {
+        let Some(domain) = &self.domain else { return Ok(()) };
+        for (index, pair) in self.golden.iter().enumerate() {
+            for (feature, value) in pair.input.iter().enumerate() {
+                let (min, max) = (domain.min[feature], domain.max[feature]);
+                if !(min..=max).contains(value) {
+                    let name = features::name(feature);
+                    let problem = format!("pair {index}: {name} is {value}, outside its trained range {min} to {max}");
+                    return Err(CardError::Numbers { key: "ravenpose.golden", problem });
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 fn domain(metadata: &BTreeMap<String, String>, untrained: bool) -> Result<Option<Domain>, CardError> {

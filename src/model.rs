@@ -126,9 +126,11 @@ pub fn load(source: &ModelSource) -> Result<(Model<Plan>, Card), ModelError> {
     check_hash(source, &path, &hex(&digest))?;
     let network = import(&source.path, &bytes)?;
     drop(bytes);
-    let card = Card::read(&network.metadata).map_err(|cause| ModelError::Card { path: path.clone(), cause })?;
+    let unusable = |cause| ModelError::Card { path: path.clone(), cause };
+    let card = Card::read(&network.metadata).map_err(unusable)?;
     let mut plan = Plan::new(&network);
     check_golden(&path, &mut plan, &card)?;
+    card.check_range().map_err(unusable)?;
     let model = Model {
         estimator: plan,
         guard: Guard::new(card.domain.clone()),

@@ -364,8 +364,10 @@ fn a_missing_or_malformed_hash_is_refused_with_the_command_that_makes_one() {
     std::fs::create_dir(&beside).expect("a directory");
     check("not a regular file");
     std::fs::remove_dir(&beside).expect("a directory");
+    // Through the service, which is stopped if it should wait for a writer.
     make_fifo(&beside);
-    check("not a regular file");
+    let line = service_refusal(&directory.file("config.toml", "[gold]\nmodel = \"model.onnx\"\n"));
+    assert!(line.contains(&format!("({}: not a regular file)", beside.display())), "{line}");
 }
 
 #[test]
@@ -495,7 +497,7 @@ const HOSTILE: [(&str, Option<&str>); 28] = [
     ("output_width_4.onnx", Some("graph output `position_error` has shape [1, 4]: expected [1, 3]")),
     ("declared_120_weights_118.onnx", Some("graph input `ravenstate` has shape [1, 120]: expected [1, 118]")),
     ("batch_64.onnx", Some("graph input `ravenstate` has shape [64, 118]: expected [1, 118]")),
-    ("float16.onnx", Some("float16: expected float32")),
+    ("float16.onnx", Some("is FLOAT16: expected float32")),
     ("weight_nan.onnx", Some("is NaN: expected a finite float32")),
     ("bias_inf.onnx", Some("is inf: expected a finite float32")),
     ("bn_negative_variance.onnx", Some("is -0.5: expected more than 0")),
@@ -518,7 +520,7 @@ const HOSTILE: [(&str, Option<&str>); 28] = [
 fn the_service_handles_every_hostile_file_as_its_readme_wants() {
     let Some(bad) = common::shared("models/bad") else { return };
     let entries = std::fs::read_dir(&bad).expect("the directory").map(|entry| entry.expect("an entry").file_name());
-    let mut present: Vec<_> = entries.filter_map(|name| name.into_string().ok()).filter(|name| name.ends_with(".onnx")).collect();
+    let mut present: Vec<_> = entries.filter_map(|name| name.into_string().ok()).filter(|name| name != "README.md").collect();
     let mut known: Vec<&str> = HOSTILE.iter().map(|(name, _)| *name).collect();
     present.sort_unstable();
     known.sort_unstable();
@@ -554,12 +556,15 @@ fn networks_of_another_shape_type_or_operator_are_refused_with_expected_and_foun
         (Small::new(119, 3).onnx().bytes(), "graph input `ravenstate` has shape [1, 119]: expected [1, 118]; "),
         (Small::new(118, 2).onnx().bytes(), "graph output `error` has shape [1, 2]: expected [1, 3]; "),
         (Small::new(118, 4).onnx().bytes(), "graph output `error` has shape [1, 4]: expected [1, 3]; "),
-        (changed(|network| network.element = Small::DOUBLE), "graph input `ravenstate` is float64: expected float32; "),
+        (changed(|network| network.element = Small::DOUBLE), "graph input `ravenstate` is DOUBLE: expected float32; "),
         (changed(|network| network.activation = "Softmax"), "node `node.hidden`: operator `Softmax` is not supported: expected "),
         (changed(|network| network.activation = "Raven"), "node `node.hidden`: operator `Raven` is not supported: expected "),
         (changed(|network| network.hidden_weights[130] = f32::NAN), "`w0`, number 130, is NaN: expected a finite float32"),
         (changed(|network| network.last_bias[2] = f32::NEG_INFINITY), "`b1`, number 2, is -inf: expected a finite float32"),
-        (changed(|network| drop(network.last_bias.pop())), "tensor `b1` stores 8 bytes: expected 3 numbers for dimensions [3]"),
+        (
+            changed(|network| network.last_bias.truncate(2)),
+            "tensor `b1` stores 8 bytes of raw data: expected 3 numbers for dimensions [3]",
+        ),
     ];
     for (bytes, expected) in cases {
         let line = refusal(&directory, &bytes);
@@ -698,6 +703,35 @@ fn a_property_that_occurs_twice_is_refused() {
     assert_eq!(refusal(&directory, &onnx.bytes()), "metadata key `ravenpose.units` occurs twice: expected each key once");
 }
 
+#[test]
+fn a_trained_range_of_another_order_or_unit_is_refused() {
+    let directory = TempDir::new("models-range");
+    let untrained = Onnx::untrained();
+    let with = |change: fn(&mut Vec<f64>)| {
+        ["ravenpose.feature_min", "ravenpose.feature_max"].into_iter().fold(untrained.clone(), |onnx, key| {
+            let mut numbers = onnx.get(key).split_ascii_whitespace().map(|word| word.parse().expect("a number")).collect();
+            change(&mut numbers);
+            onnx.set(key, words(&numbers))
+        })
+    };
+    let cases = [
+        ("positions in m", with(|list| list[..6].iter_mut().for_each(|limit| *limit /= 1e6)), "pair 1: pos[0] is "),
+        (
+            "angles in rad",
+            with(|list| list[88..90].iter_mut().for_each(|limit| *limit = limit.to_radians())),
+            "pair 0: jpos_d[0] is ",
+        ),
+        ("shifted by one", with(|list| list.rotate_left(1)), "pair 0: jpos[1] is "),
+        ("reversed", with(|list| list.reverse()), "pair 0: encVals[3] is "),
+        ("two neighbours swapped", with(|list| list.swap(57, 58)), "pair 0: jpos[1] is "),
+    ];
+    for (case, onnx, problem) in cases {
+        let line = load_bytes(&directory, &onnx.bytes()).err().unwrap_or_else(|| panic!("{case}: accepted"));
+        assert!(line.starts_with(&format!("property ravenpose.golden: {problem}")), "{case}: {line}");
+        assert!(line.contains(", outside its trained range "), "{case}: {line}");
+    }
+}
+
 /// A change of the card's golden pairs or of the network, and where the first difference is seen, if that is known.
 type Disagreement = (&'static str, Onnx, Option<(usize, usize)>);
 
@@ -709,7 +743,7 @@ fn disagreements(onnx: &Onnx) -> Vec<Disagreement> {
         golden("outputs in m", |rows| rows.iter_mut().for_each(|row| row[118..].iter_mut().for_each(|y| *y /= 1000.0)), None),
         golden("the other sign", |rows| rows.iter_mut().for_each(|row| row[118..].iter_mut().for_each(|y| *y = -*y)), None),
         golden("outputs permuted", |rows| rows.iter_mut().for_each(|row| row.swap(118, 120)), None),
-        golden("pairs permuted", |rows| rows[1..].rotate_left(1), None),
+        golden("the output of another pair", |rows| (118..121).for_each(|i| rows[2][i] = rows[1][i]), Some((2, 0))),
         golden("two neighbouring features swapped", |rows| rows.iter_mut().for_each(|row| row.swap(1, 2)), None),
         golden("pos and pos_d swapped", |rows| rows.iter_mut().for_each(|row| (0..3).for_each(|i| row.swap(i, i + 3))), None),
         golden("mpos and mpos_d swapped", |rows| rows.iter_mut().for_each(|row| (48..56).for_each(|i| row.swap(i, i + 32))), None),
@@ -721,7 +755,7 @@ fn disagreements(onnx: &Onnx) -> Vec<Disagreement> {
 }
 
 fn golden_fails(directory: &TempDir, (name, onnx, place): &Disagreement) {
-    let line = refusal(directory, &onnx.bytes());
+    let line = load_bytes(directory, &onnx.bytes()).err().unwrap_or_else(|| panic!("{name}: accepted"));
     assert!(line.starts_with("golden pair ") && line.contains(" mm, the card says "), "{name}: {line}");
     assert!(line.ends_with("; card and network do not belong together, export the model again"), "{name}: {line}");
     if let Some((pair, axis)) = place {
@@ -753,7 +787,7 @@ fn a_network_that_disagrees_with_its_card_is_refused() {
         changed("one weight of the last layer scaled", |network| network.last_weights[5] *= 1.01),
         changed("one weight of the first layer negated", |network| network.hidden_weights[500] *= -1.0),
         changed("one input in other units", |network| {
-            network.hidden_weights.iter_mut().step_by(FEATURES).for_each(|w| *w *= 1000.0)
+            network.hidden_weights.iter_mut().step_by(FEATURES).for_each(|w| *w *= 1000.0);
         }),
         changed("another bias", |network| network.last_bias.swap(0, 1)),
         changed("another activation", |network| network.activation = "Tanh"),

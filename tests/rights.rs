@@ -1,0 +1,145 @@
+//! A machine that refuses what real time needs: the start is refused with one line, or goes on where the configuration allows it, and
+//! then every message says so.
+
+mod common;
+#[path = "common/service.rs"]
+mod service;
+
+use ravenpose::report::Stats;
+use service::{World, publish_forever, role};
+use std::os::unix::fs::chown;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// `nobody` on Debian.
+const NOBODY: u32 = 65_534;
+
+/// Makes the command run as an ordinary user who may neither lock memory nor have FIFO.
+fn without_rights(command: &mut Command) -> &mut Command {
+    // SAFETY: only system calls between fork and exec.
+    unsafe {
+        command.pre_exec(|| {
+            let none = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+            let small = libc::rlimit { rlim_cur: 65_536, rlim_max: 65_536 };
+            libc::setrlimit(libc::RLIMIT_RTPRIO, &raw const none);
+            libc::setrlimit(libc::RLIMIT_MEMLOCK, &raw const small);
+            Ok(())
+        })
+    };
+    command.uid(NOBODY).gid(NOBODY)
+}
+
+/// Only root can become somebody else.
+fn may_change_user() -> bool {
+    // SAFETY: no arguments, no memory.
+    let root = unsafe { libc::geteuid() } == 0;
+    if !root {
+        println!("skipped: only root can start the service as a user without rights");
+    }
+    root
+}
+
+fn world(name: &str) -> World {
+    let world = World::new(name);
+    chown(&world.dir.0, Some(NOBODY), Some(NOBODY)).expect("root may give a directory away");
+    world
+}
+
+#[test]
+fn each_missing_right_is_refused_with_one_line_and_its_remedy() {
+    if !may_change_user() {
+        return;
+    }
+    for (table, what, remedy) in [
+        ("", "memory cannot be locked", "LimitMEMLOCK=infinity"),
+        ("lock_memory = false", "SCHED_FIFO priority 80 is refused", "LimitRTPRIO=80"),
+        ("lock_memory = false\ncore = 4000", "the loop cannot be pinned to core 4000", "choose loop.core"),
+        ("lock_memory = false\nwait = \"spin\"", "real-time throttling is on", "sched_rt_runtime_us=-1"),
+    ] {
+        let world = world("rights");
+        let config = world.config(&format!("allow_untrained = true\n[loop]\n{table}"));
+        let output = without_rights(&mut world.service(&config)).output().expect("service");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let last = text.lines().last().expect("a line");
+        if what.contains("throttling")
+            && std::fs::read_to_string("/proc/sys/kernel/sched_rt_runtime_us").is_ok_and(|v| v.trim() == "-1")
+        {
+            println!("skipped: real-time throttling is off here");
+            continue;
+        }
+        assert!(last.contains(what) && last.contains(remedy) && last.contains("allow_degraded = true"), "{last}");
+    }
+}
+
+#[test]
+fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    if !may_change_user() {
+        return;
+    }
+    let world = world("degraded");
+    let config = world.config("allow_untrained = true\nallow_degraded = true");
+    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
+    let mut service = service::Process(without_rights(&mut world.service(&config)).stderr(log).spawn().expect("service"));
+    let this = std::env::current_exe().expect("this program");
+    let mut publisher = world.command(&this.display().to_string());
+    let publisher = without_rights(&mut publisher)
+        .args(["with_allow_degraded_it_goes_on_and_every_message_says_so", "--exact", "--nocapture"])
+        .env("RAVENPOSE_TEST_ROLE", "publisher")
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("publisher");
+    let _publisher = service::Process(publisher);
+    let begun = Instant::now();
+    let stats = loop {
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(begun.elapsed() < Duration::from_secs(15), "{}", world.log());
+        let read = std::fs::read(world.dir.0.join("run/stats.json")).unwrap_or_default();
+        if let Ok(stats) = serde_json::from_slice::<Stats>(&read)
+            && stats.counters.iter().any(|counter| counter.name == "published" && counter.value > 200)
+        {
+            break stats;
+        }
+    };
+    for arm in &stats.arms {
+        assert!(arm.flags.iter().any(|flag| flag == "not_realtime"), "{arm:?}");
+    }
+    let words = world.log();
+    assert!(words.contains("NOT REAL TIME: memory cannot be locked") && words.contains("NOT REAL TIME: SCHED_FIFO"), "{words}");
+    service.signal(libc::SIGTERM);
+    assert_eq!(service.end().code(), Some(0));
+}
+
+#[test]
+fn a_rejected_model_is_flagged_where_that_is_allowed() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let world = World::new("rejected");
+    let broken = world.dir.file("broken.onnx", b"not a model");
+    world.dir.file("broken.onnx.sha256", "0000000000000000000000000000000000000000000000000000000000000000  broken.onnx\n");
+    let path = world.config("allow_untrained = true\nallow_degraded = true");
+    let text = std::fs::read_to_string(&path).expect("configuration");
+    let green = text.find("[green]").expect("green");
+    let report = text.find("[report]").expect("report");
+    let text = format!("{}[green]\nmodel = \"{}\"\n{}", &text[..green], broken.display(), &text[report..]);
+    std::fs::write(&path, text).expect("configuration");
+    let _service = world.start(&path, &[]);
+    let reader = world.poses();
+    let _publisher = world.role("a_rejected_model_is_flagged_where_that_is_allowed", "publisher");
+    let begun = Instant::now();
+    loop {
+        assert!(begun.elapsed() < Duration::from_secs(10), "{}", world.log());
+        let Some(pose) = reader.next().expect("pose") else { continue };
+        assert_ne!(pose.arm[1].flags & ravenpose_wire::flag::MODEL_REJECTED, 0);
+        assert_eq!(pose.arm[1].correction_um, [0.0; 3]);
+        if pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32 {
+            break;
+        }
+    }
+    assert!(world.log().contains("broken.onnx: SHA-256 is"), "{}", world.log());
+}
