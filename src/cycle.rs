@@ -391,6 +391,7 @@ struct Judgement {
 }
 
 impl<E: Estimator> Arm<E> {
+    #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
     fn judge(
         &mut self,
         state: &RavenState,

@@ -129,11 +129,11 @@ impl Guard {
 }
 
 impl Domain {
+    #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
     fn check(&self, features: &[f32; FEATURES], verdict: &mut Verdict) {
         let mut inside = true;
         let mut squares = 0.0_f32;
-        for index in 0..FEATURES {
-            let value = features[index];
+        for (index, &value) in features.iter().enumerate() {
             inside &= value >= self.min[index] && value <= self.max[index];
             let distance = (value - self.center[index]) * self.weight[index];
             squares += distance * distance;

@@ -181,12 +181,12 @@ fn stated_hash(model: &Path) -> Result<(String, String), ModelError> {
     Ok((hash.to_owned(), shown))
 }
 
+#[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
 fn check_golden(path: &str, plan: &mut Plan, card: &Card) -> Result<(), ModelError> {
     for (index, golden) in card.golden.iter().enumerate() {
         let mut output = [0.0_f32; 3];
         plan.run(&golden.input, &mut output);
-        for axis in 0..3 {
-            let (found, expected) = (f64::from(output[axis]), golden.output[axis]);
+        for (axis, (found, expected)) in output.into_iter().map(f64::from).zip(golden.output).enumerate() {
             // Written so that NaN fails.
             if !((found - expected).abs() <= GOLDEN_TOLERANCE * expected.abs().max(1.0)) {
                 return Err(ModelError::Golden { path: path.to_owned(), index, axis, found, expected });

@@ -92,6 +92,7 @@ struct Seen {
 }
 
 /// Stage times of one turn.
+#[expect(clippy::struct_field_names, reason = "the unit belongs to each name")]
 struct Laps {
     last_ns: i64,
     features_ns: i64,
@@ -164,16 +165,12 @@ impl<E: Estimator> Runner<E> {
     ///
     /// # Errors
     /// Any [`TransportError`] of opening; the old link is still in place then.
-    pub fn reopen(mut self, settings: &Settings) -> Result<Self, (Self, TransportError)> {
-        match Link::open(settings, self.waiting.wait) {
-            Ok(link) => {
-                self.link = link;
-                self.report(Event::Reopened);
-                self.shared.reopen.store(false, Relaxed);
-                Ok(self)
-            }
-            Err(error) => Err((self, error)),
-        }
+    pub fn reopen(&mut self, settings: &Settings) -> Result<(), TransportError> {
+        let opened = Link::open(settings, self.waiting.wait);
+        self.shared.reopen.store(false, Relaxed);
+        self.link = opened?;
+        self.report(Event::Reopened);
+        Ok(())
     }
 
     /// One cycle: wait, take the newest state, answer it, publish, record.

@@ -245,7 +245,6 @@ fn spawn_loop(
             // Refusals were weighed before; whoever got here without these rights was allowed to.
             let _ = config.core.map(realtime::pin);
             let _ = realtime::set_fifo(config.priority);
-            let shared = ends.2.clone();
             let waiting = Waiting { wait: config.wait, spin_ns: config.spin_ns };
             let mut runner = match Runner::open(&config.transport, cycle, config.limits, waiting, ends) {
                 Ok(runner) => runner,
@@ -259,11 +258,8 @@ fn spawn_loop(
             }
             let _ = ready.send(Ok(()));
             while runner.run() == Ended::Reopen {
-                runner = runner.reopen(&config.transport).unwrap_or_else(|(old, _)| {
-                    // Still held by others: the ordinary thread will ask again.
-                    shared.reopen.store(false, Relaxed);
-                    old
-                });
+                // If others still hold the place the old link stays, and the ordinary thread asks again.
+                let _ = runner.reopen(&config.transport);
             }
             Ok(runner.into_recorder().into_active())
         })

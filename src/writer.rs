@@ -4,7 +4,7 @@ use crate::histogram::Histograms;
 use crate::report::{self, Log};
 use crate::say;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -31,8 +31,9 @@ impl Writer {
     /// The system's, when there can be no further thread.
     pub fn start(stats_path: PathBuf, log: Option<Log>) -> io::Result<Self> {
         let (jobs, waiting) = sync_channel(WAITING);
-        let thread =
-            std::thread::Builder::new().name("ravenpose-writer".to_owned()).spawn(move || write_all(&waiting, &stats_path, log))?;
+        let thread = std::thread::Builder::new()
+            .name("ravenpose-writer".to_owned())
+            .spawn(move || write_all(&waiting, &stats_path, log.as_ref()))?;
         Ok(Self { jobs: Some(jobs), thread: Some(thread) })
     }
 
@@ -64,7 +65,7 @@ impl Writer {
     }
 }
 
-fn write_all(jobs: &Receiver<Job>, stats_path: &PathBuf, log: Option<Log>) {
+fn write_all(jobs: &Receiver<Job>, stats_path: &Path, log: Option<&Log>) {
     let mut complained = [false; 2];
     // What could not be written goes out with the next interval.
     let mut unwritten: Option<(Histograms, Duration)> = None;
@@ -72,7 +73,7 @@ fn write_all(jobs: &Receiver<Job>, stats_path: &PathBuf, log: Option<Log>) {
         match job {
             Job::Stats(bytes) => complain_once(&mut complained[0], "statistics", report::write_whole(stats_path, &bytes)),
             Job::Log { interval, total, length } => {
-                let Some(log) = &log else { continue };
+                let Some(log) = log else { continue };
                 let (mut whole, mut long) = unwritten.take().unwrap_or_else(|| (Histograms::new(), Duration::ZERO));
                 whole.add(&interval);
                 long += length;

@@ -116,18 +116,18 @@ fn fifty_random_kills_of_any_process_are_survived() {
         Some("client") => client(),
         _ => {}
     }
-    const TEST: &str = "fifty_random_kills_of_any_process_are_survived";
+    let test = "fifty_random_kills_of_any_process_are_survived";
     let world = World::new("kill");
     let config = world.config(CONFIG);
     let mut service = world.start(&config, &[]);
-    let mut publisher = world.role(TEST, "publisher");
-    let mut client = world.role(TEST, "client");
+    let mut publisher = world.role(test, "publisher");
+    let mut client = world.role(test, "client");
     let mut client_output = hears_fresh(&mut client);
     let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
     monitor.watch_ms(300);
     let baseline = common::shared_files(&world.settings.prefix).len();
     let seed = std::env::var("RAVENPOSE_KILL_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_261_121);
-    println!("seed {seed} (RAVENPOSE_KILL_SEED), {} shared files at first", baseline);
+    println!("seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
     let mut rng = common::Rng(seed);
     let (mut slowest_fresh, mut slowest_valid, mut most_files) = (0, 0, baseline);
     for kill in 0..kills() {
@@ -139,7 +139,7 @@ fn fifty_random_kills_of_any_process_are_survived() {
                 publisher.kill();
                 std::thread::sleep(pause);
                 monitor.restart();
-                publisher = world.role(TEST, "publisher");
+                publisher = world.role(test, "publisher");
             }
             1 => {
                 service.kill();
@@ -152,7 +152,7 @@ fn fifty_random_kills_of_any_process_are_survived() {
                 nothing_wrong(&mut client_output);
                 std::thread::sleep(pause);
                 let begun = Instant::now();
-                client = world.role(TEST, "client");
+                client = world.role(test, "client");
                 client_output = hears_fresh(&mut client);
                 assert!(begun.elapsed() < Duration::from_secs(1), "kill {kill}: the client took {:?}", begun.elapsed());
                 monitor.restart();
@@ -194,13 +194,13 @@ fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_not
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
-    const TEST: &str = "every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing";
+    let test = "every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing";
     let mut rng = common::Rng(42);
     for signal in [libc::SIGTERM, libc::SIGINT, libc::SIGHUP] {
         let world = World::new(&format!("stop{signal}"));
         let config = world.config(CONFIG);
         let mut service = world.start(&config, &[]);
-        let publisher = world.role(TEST, "publisher");
+        let publisher = world.role(test, "publisher");
         let reader = world.poses();
         let mut last = None;
         let mut seen = 0;
@@ -256,11 +256,11 @@ fn a_service_whose_files_were_removed_opens_its_link_anew() {
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
-    const TEST: &str = "a_service_whose_files_were_removed_opens_its_link_anew";
+    let test = "a_service_whose_files_were_removed_opens_its_link_anew";
     let world = World::new("removed");
     let config = world.config(CONFIG);
     let _service = world.start(&config, &[]);
-    let mut publisher = world.role(TEST, "publisher");
+    let mut publisher = world.role(test, "publisher");
     let wait_for_poses = |what: &str| {
         let begun = Instant::now();
         // A newcomer each time: the old reader may hang on the dead service.
@@ -280,7 +280,7 @@ fn a_service_whose_files_were_removed_opens_its_link_anew() {
     publisher.kill();
     common::remove_shared_memory(&world.settings.prefix);
     let _ = std::fs::remove_dir_all(&world.settings.root);
-    let _publisher = world.role(TEST, "publisher");
+    let _publisher = world.role(test, "publisher");
     wait_for_poses("poses after the files were removed");
     assert!(world.log().contains("opening the link anew"), "{}", world.log());
 }

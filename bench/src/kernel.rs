@@ -26,6 +26,7 @@ fn stream_avx512(weights: &[f32]) -> f32 {
     stream_any(weights)
 }
 
+#[expect(clippy::inline_always, reason = "compiled for the caller's instruction set")]
 #[inline(always)]
 fn stream_any(weights: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 128];

@@ -24,6 +24,11 @@ impl Table {
         Self { title: title.to_owned(), columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
+    /// The first row of this name.
+    pub(crate) fn find(&self, name: &str) -> Option<&[f64]> {
+        self.rows.iter().find(|(row, _)| row == name).map(|(_, values)| values.as_slice())
+    }
+
     pub(crate) fn row(&mut self, name: &str, values: &[f64]) {
         self.rows.push((name.to_owned(), values.to_vec()));
     }

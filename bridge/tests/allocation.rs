@@ -60,8 +60,8 @@ fn million() -> ! {
         let mut reader = null_mut();
         // SAFETY: valid pointers, as the header asks.
         unsafe {
-            assert_eq!(ravenpose_publisher_open(&options(), &mut publisher, null_mut(), 0), 0);
-            assert_eq!(ravenpose_pose_reader_open(&options(), &mut reader, null_mut(), 0), 0);
+            assert_eq!(ravenpose_publisher_open(&options(), &raw mut publisher, null_mut(), 0), 0);
+            assert_eq!(ravenpose_pose_reader_open(&options(), &raw mut reader, null_mut(), 0), 0);
         }
         let mut pose = CorrectedPose::new();
         let mut got = CorrectedPose::new();
@@ -70,7 +70,7 @@ fn million() -> ! {
                 let mut state = null_mut();
                 // SAFETY: live handles, and `state` was given by `loan`.
                 unsafe {
-                    assert_eq!(ravenpose_publisher_loan(publisher, &mut state), 0);
+                    assert_eq!(ravenpose_publisher_loan(publisher, &raw mut state), 0);
                     (*state).pos[0] = call as i32;
                     assert_eq!(ravenpose_publisher_send(publisher), 0);
                 }
@@ -83,8 +83,8 @@ fn million() -> ! {
                     poses.send(&pose).expect("pose sent");
                 }
                 // SAFETY: live handle, valid place.
-                let code = unsafe { ravenpose_pose_reader_take(reader, &mut got) };
-                assert_eq!(code, if call % 3 == 0 { 0 } else { 1 });
+                let code = unsafe { ravenpose_pose_reader_take(reader, &raw mut got) };
+                assert_eq!(code, i32::from(call % 3 != 0));
                 if code == 0 {
                     assert_eq!(got.sequence, pose.sequence);
                     READ.fetch_add(1, SeqCst);

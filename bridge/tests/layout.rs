@@ -51,7 +51,10 @@ macro_rules! compiled {
     };
 }
 
-fn rust_layouts() -> [(&'static str, &'static str, usize, Vec<(String, usize)>); 3] {
+/// Heading in the document, name in C, size, and each field with its offset.
+type Layout = (&'static str, &'static str, usize, Vec<(String, usize)>);
+
+fn rust_layouts() -> [Layout; 3] {
     [
         (
             "## `raven/state`",

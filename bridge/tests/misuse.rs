@@ -32,23 +32,23 @@ fn null_is_refused_everywhere() {
     // SAFETY: null is what is being tested; everything else is valid.
     unsafe {
         let missing = Code::Null as i32;
-        assert_eq!(ravenpose_publisher_open(null(), &mut publisher, null_mut(), 0), missing);
+        assert_eq!(ravenpose_publisher_open(null(), &raw mut publisher, null_mut(), 0), missing);
         assert_eq!(ravenpose_publisher_open(&options(&name), null_mut(), null_mut(), 0), missing);
-        assert_eq!(ravenpose_publisher_loan(null_mut(), &mut state), missing);
+        assert_eq!(ravenpose_publisher_loan(null_mut(), &raw mut state), missing);
         assert_eq!(ravenpose_publisher_send(null_mut()), missing);
         assert_eq!(ravenpose_publisher_publish(null_mut(), &RavenState::new()), missing);
         assert_eq!(ravenpose_publisher_readers(null()), 0);
         ravenpose_publisher_close(null_mut());
-        ravenpose_publisher_close(&mut publisher);
-        assert_eq!(ravenpose_pose_reader_open(null(), &mut reader, null_mut(), 0), missing);
-        assert_eq!(ravenpose_pose_reader_take(null_mut(), &mut pose), missing);
-        assert_eq!(ravenpose_pose_reader_next(null_mut(), &mut pose), missing);
-        assert_eq!(ravenpose_pose_reader_wait(null_mut(), 0, &mut pose), missing);
+        ravenpose_publisher_close(&raw mut publisher);
+        assert_eq!(ravenpose_pose_reader_open(null(), &raw mut reader, null_mut(), 0), missing);
+        assert_eq!(ravenpose_pose_reader_take(null_mut(), &raw mut pose), missing);
+        assert_eq!(ravenpose_pose_reader_next(null_mut(), &raw mut pose), missing);
+        assert_eq!(ravenpose_pose_reader_wait(null_mut(), 0, &raw mut pose), missing);
         ravenpose_pose_reader_close(null_mut());
-        ravenpose_pose_reader_close(&mut reader);
+        ravenpose_pose_reader_close(&raw mut reader);
         assert_eq!(ravenpose_state_init(null_mut()), missing);
         assert_eq!(ravenpose_position(null(), 0, 0, um.as_mut_ptr()), missing);
-        assert_eq!(ravenpose_position(&pose, 0, 0, null_mut()), missing);
+        assert_eq!(ravenpose_position(&raw const pose, 0, 0, null_mut()), missing);
     }
 }
 
@@ -66,7 +66,10 @@ fn another_version_is_refused_with_both_versions_in_the_message() {
         let mut message = [1 as c_char; 512];
         // SAFETY: valid pointers, and the buffer has the stated size.
         let text = unsafe {
-            assert_eq!(ravenpose_publisher_open(&wrong, &mut publisher, message.as_mut_ptr(), message.len()), Code::Version as i32);
+            assert_eq!(
+                ravenpose_publisher_open(&raw const wrong, &raw mut publisher, message.as_mut_ptr(), message.len()),
+                Code::Version as i32
+            );
             assert!(publisher.is_null());
             CStr::from_ptr(message.as_ptr()).to_str().expect("UTF-8")
         };
@@ -83,7 +86,7 @@ fn a_short_message_buffer_is_filled_and_terminated() {
     let mut reader = null_mut();
     let mut message = [7 as c_char; 12];
     // SAFETY: valid pointers, and the buffer is stated shorter than it is.
-    unsafe { ravenpose_pose_reader_open(&wrong, &mut reader, message.as_mut_ptr(), 8) };
+    unsafe { ravenpose_pose_reader_open(&raw const wrong, &raw mut reader, message.as_mut_ptr(), 8) };
     assert_eq!((message[7], message[8]), (0, 7));
 }
 
@@ -94,22 +97,25 @@ fn one_publisher_only_and_its_place_is_free_again_after_close() {
     let mut message = [0 as c_char; 512];
     // SAFETY: valid pointers; handles are closed once.
     unsafe {
-        assert_eq!(ravenpose_publisher_open(&options(&name), &mut first, null_mut(), 0), 0);
-        assert_eq!(ravenpose_publisher_open(&options(&name), &mut second, message.as_mut_ptr(), message.len()), Code::Full as i32);
+        assert_eq!(ravenpose_publisher_open(&options(&name), &raw mut first, null_mut(), 0), 0);
+        assert_eq!(
+            ravenpose_publisher_open(&options(&name), &raw mut second, message.as_mut_ptr(), message.len()),
+            Code::Full as i32
+        );
         assert!(second.is_null());
         assert!(CStr::from_ptr(message.as_ptr()).to_string_lossy().contains("raven/state"));
         assert_eq!(ravenpose_publisher_send(first), Code::Loan as i32, "send without loan");
         let (mut state, mut again) = (null_mut(), null_mut());
-        assert_eq!(ravenpose_publisher_loan(first, &mut state), 0);
-        assert_eq!(ravenpose_publisher_loan(first, &mut again), 0);
+        assert_eq!(ravenpose_publisher_loan(first, &raw mut state), 0);
+        assert_eq!(ravenpose_publisher_loan(first, &raw mut again), 0);
         assert_eq!(state, again, "the same place until it is sent");
         assert_eq!((*state).sequence, 1);
         // Closing with a loan out is allowed.
-        ravenpose_publisher_close(&mut first);
+        ravenpose_publisher_close(&raw mut first);
         assert!(first.is_null());
-        ravenpose_publisher_close(&mut first);
-        assert_eq!(ravenpose_publisher_open(&options(&name), &mut second, null_mut(), 0), 0);
-        ravenpose_publisher_close(&mut second);
+        ravenpose_publisher_close(&raw mut first);
+        assert_eq!(ravenpose_publisher_open(&options(&name), &raw mut second, null_mut(), 0), 0);
+        ravenpose_publisher_close(&raw mut second);
     }
 }
 
@@ -118,7 +124,7 @@ fn a_prefix_that_is_no_file_name_is_refused() {
     let name = CString::new("../evil").expect("no NUL");
     let mut publisher = null_mut();
     // SAFETY: valid pointers.
-    assert_eq!(unsafe { ravenpose_publisher_open(&options(&name), &mut publisher, null_mut(), 0) }, Code::Argument as i32);
+    assert_eq!(unsafe { ravenpose_publisher_open(&options(&name), &raw mut publisher, null_mut(), 0) }, Code::Argument as i32);
 }
 
 #[test]

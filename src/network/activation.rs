@@ -5,6 +5,8 @@
 //!
 //! This module contains `unsafe`: calls of functions compiled for an instruction set that was found on this machine.
 
+#![expect(clippy::inline_always, reason = "inlined into functions compiled for an instruction set, or they would not use it")]
+
 use super::InstructionSet;
 use super::kernel::Lane;
 use ravenpose_importer::Activation;
@@ -12,7 +14,7 @@ use ravenpose_importer::Activation;
 /// Beyond this a sigmoid is 0 or 1 to 4e-18, and its smallest value stays far from the denormal range.
 const SIGMOID_LIMIT: f32 = 40.0;
 
-pub(super) fn apply(set: InstructionSet, activation: &Activation, values: &mut [Lane]) {
+pub(super) fn apply(set: InstructionSet, activation: Activation, values: &mut [Lane]) {
     match set {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `set` was found on this machine.
@@ -26,19 +28,19 @@ pub(super) fn apply(set: InstructionSet, activation: &Activation, values: &mut [
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn apply_avx512(activation: &Activation, values: &mut [Lane]) {
+fn apply_avx512(activation: Activation, values: &mut [Lane]) {
     apply_any(activation, values);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn apply_avx2(activation: &Activation, values: &mut [Lane]) {
+fn apply_avx2(activation: Activation, values: &mut [Lane]) {
     apply_any(activation, values);
 }
 
 #[inline(always)]
-fn apply_any(activation: &Activation, values: &mut [Lane]) {
-    match *activation {
+fn apply_any(activation: Activation, values: &mut [Lane]) {
+    match activation {
         Activation::Identity => {}
         Activation::Sigmoid => each(values, sigmoid),
         Activation::Tanh => each(values, |x| 2.0 * sigmoid(2.0 * x) - 1.0),
@@ -115,7 +117,7 @@ mod tests {
                 [Activation::Identity, Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu { alpha: 1.0 }]
             {
                 let mut values = [Lane([f32::NAN; 16])];
-                apply(set.available(), &activation, &mut values);
+                apply(set.available(), activation, &mut values);
                 assert!(values[0].0.iter().all(|value| value.is_nan()), "{activation:?} {set:?}");
             }
         }

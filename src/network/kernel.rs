@@ -31,6 +31,7 @@ impl InstructionSet {
     }
 
     /// This one if the machine has it, else the next narrower that it has.
+    #[must_use]
     pub fn available(self) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -100,7 +101,11 @@ fn dense_portable(weights: &[Lane], row_lanes: usize, input: &[Lane], output: &m
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::{LANE, Lane, ROWS};
-    use std::arch::x86_64::*;
+    use std::arch::x86_64::{
+        _mm_add_ps, _mm_add_ss, _mm_cvtss_f32, _mm_movehl_ps, _mm_shuffle_ps, _mm256_add_ps, _mm256_castps256_ps128,
+        _mm256_extractf128_ps, _mm256_fmadd_ps, _mm256_load_ps, _mm256_setzero_ps, _mm512_add_ps, _mm512_fmadd_ps, _mm512_load_ps,
+        _mm512_reduce_add_ps, _mm512_setzero_ps,
+    };
 
     /// # Safety
     /// AVX-512F must be present, and `weights` must hold a multiple of four rows of `row_lanes` lanes, `input` `row_lanes` lanes and

@@ -120,7 +120,7 @@ impl Plan {
         }
         for layer in &self.layers {
             kernel::dense(self.instruction_set, &layer.weights, &layer.bias, layer.row_lanes, &self.front, &mut self.back);
-            activation::apply(self.instruction_set, &layer.activation, &mut self.back[..layer.bias.len()]);
+            activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.bias.len()]);
             std::mem::swap(&mut self.front, &mut self.back);
         }
         for (to, from) in output.iter_mut().zip(self.front.iter().flat_map(|lane| lane.0)).take(self.output_width) {

@@ -2,6 +2,8 @@
 //!
 //! The generator knows the truth of every state it made; the checks use that and the published messages only.
 
+#![expect(clippy::large_types_passed_by_value, reason = "messages are handed on as the link does")]
+
 use crate::common::Rng;
 use crate::world::{BOUND_UM, Fake, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, cycle, state};
 use ravenpose::cycle::{Counters, Cycle, Limits};

@@ -4,16 +4,16 @@ use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
 use ravenpose::guard::Guard;
 use ravenpose_wire::{CorrectedPose, FEATURES, RavenState};
 
-pub const MS: i64 = 1_000_000;
+pub(crate) const MS: i64 = 1_000_000;
 /// `dac_val` of joint slot 0 that makes the estimator misbehave.
-pub const OUT_NAN: i32 = 771;
-pub const OUT_INFINITE: i32 = 772;
-pub const OUT_HUGE: i32 = 773;
+pub(crate) const OUT_NAN: i32 = 771;
+pub(crate) const OUT_INFINITE: i32 = 772;
+pub(crate) const OUT_HUGE: i32 = 773;
 /// Largest correction of the test model, µm.
-pub const BOUND_UM: f64 = 8_000.0;
+pub(crate) const BOUND_UM: f64 = 8_000.0;
 
 /// A state of both arms at sample `step`, sent at `time_ns`.
-pub fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> RavenState {
+pub(crate) fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> RavenState {
     let mut state = RavenState::new();
     let t = step as f64 * 1e-3;
     state.source_id = source;
@@ -45,7 +45,7 @@ pub fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> RavenState 
 
 /// Smooth and bounded in the state, with faults on demand; counts its runs.
 #[derive(Default)]
-pub struct Fake {
+pub(crate) struct Fake {
     pub runs: u64,
 }
 
@@ -63,7 +63,7 @@ impl Estimator for Fake {
     }
 }
 
-pub fn model() -> ArmModel<Fake> {
+pub(crate) fn model() -> ArmModel<Fake> {
     ArmModel::Loaded(Box::new(Model {
         estimator: Fake::default(),
         guard: Guard::new(None),
@@ -74,12 +74,12 @@ pub fn model() -> ArmModel<Fake> {
     }))
 }
 
-pub fn cycle(limits: Limits) -> Cycle<Fake> {
+pub(crate) fn cycle(limits: Limits) -> Cycle<Fake> {
     Cycle::new(limits, [model(), model()], false, 0)
 }
 
 /// The pure cycle with a clock in its hand: one call per period.
-pub struct Bench {
+pub(crate) struct Bench {
     pub cycle: Cycle<Fake>,
     pub pose: CorrectedPose,
     pub now: i64,
@@ -89,19 +89,19 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { cycle: cycle(Limits::default()), pose: CorrectedPose::new(), now: 1_000 * MS, step: 0, took: 40_000 }
     }
 
     /// The next regular state, with sequence number = step.
-    pub fn next_state(&mut self) -> RavenState {
+    pub(crate) fn next_state(&mut self) -> RavenState {
         self.now += MS;
         self.step += 1;
         state(7, self.step, self.step, self.now)
     }
 
     /// Offers `messages` and runs one cycle; returns the pose if one is published.
-    pub fn run(&mut self, messages: &[RavenState]) -> Option<CorrectedPose> {
+    pub(crate) fn run(&mut self, messages: &[RavenState]) -> Option<CorrectedPose> {
         for message in messages {
             self.cycle.offer(message, self.now);
         }
@@ -113,13 +113,13 @@ impl Bench {
     }
 
     /// One regular cycle.
-    pub fn good(&mut self) -> CorrectedPose {
+    pub(crate) fn good(&mut self) -> CorrectedPose {
         let state = self.next_state();
         self.run(&[state]).expect("a fresh state is answered")
     }
 
     /// Good cycles until the correction is complete.
-    pub fn settle(&mut self) -> CorrectedPose {
+    pub(crate) fn settle(&mut self) -> CorrectedPose {
         for _ in 0..2000 {
             let pose = self.good();
             if pose.arm.iter().all(|arm| arm.status == 2 && arm.flags == 0) {

@@ -1,0 +1,142 @@
+//! The whole path through shared memory: this process publishes at 1 kHz on one core, `ravenposed` answers on another, and this
+//! process polls for the answer. Real processes, real service, one arm.
+
+use crate::table::{Table, quantiles};
+use ravenpose::report::Stats;
+use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
+use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::time::Duration;
+
+const PERIOD_NS: i64 = 1_000_000;
+/// Answers later than this are given up: the next state is due.
+const PATIENCE_NS: i64 = 900_000;
+/// States before anything is measured: connecting, warming up, becoming valid.
+const WARM_UP: u64 = 1_500;
+
+struct World {
+    dir: PathBuf,
+    settings: Settings,
+    service: Child,
+}
+
+impl World {
+    fn start(wait: &str, core: usize) -> Result<Self, String> {
+        let dir = std::env::temp_dir().join(format!("ravenpose-bench-{wait}-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
+        let settings =
+            Settings { prefix: format!("rpbench{wait}{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
+        let model = std::fs::canonicalize("models/untrained.onnx").map_err(|cause| format!("models/untrained.onnx: {cause}"))?;
+        let config = dir.join("c.toml");
+        let text = format!(
+            "allow_untrained = true\nallow_degraded = true\n[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\nwait = \"{wait}\"\n[gold]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\n",
+            settings.prefix,
+            settings.root,
+            model.display(),
+            dir.display()
+        );
+        std::fs::write(&config, text).map_err(|cause| cause.to_string())?;
+        let program = std::env::current_exe().map_err(|cause| cause.to_string())?.with_file_name("ravenposed");
+        let log = std::fs::File::create(dir.join("log")).map_err(|cause| cause.to_string())?;
+        let service = Command::new(&program)
+            .arg("--config")
+            .arg(&config)
+            .stderr(log)
+            .spawn()
+            .map_err(|cause| format!("{}: {cause}; run make build", program.display()))?;
+        let world = Self { dir, settings, service };
+        for _ in 0..200 {
+            if std::fs::read_to_string(world.dir.join("log")).is_ok_and(|log| log.contains("running")) {
+                return Ok(world);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Err(format!("ravenposed did not start: {}", std::fs::read_to_string(world.dir.join("log")).unwrap_or_default().trim()))
+    }
+
+    fn stop(&mut self) -> Option<Stats> {
+        // SAFETY: a signal to our own child, which was not waited for yet.
+        unsafe { libc::kill(self.service.id() as i32, libc::SIGTERM) };
+        let _ = self.service.wait();
+        serde_json::from_slice(&std::fs::read(self.dir.join("stats.json")).ok()?).ok()
+    }
+}
+
+impl Drop for World {
+    fn drop(&mut self) {
+        let _ = self.service.kill();
+        let _ = self.service.wait();
+        remove(&self.dir, &self.settings.prefix);
+    }
+}
+
+fn remove(dir: &Path, prefix: &str) {
+    let _ = std::fs::remove_dir_all(dir);
+    for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(prefix) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn state(sequence: u64) -> RavenState {
+    let mut state = RavenState::new();
+    state.arms = 1;
+    state.runlevel = 3;
+    state.type_ = [49, 0];
+    state.dt_nsec = 1_000_000;
+    state.pos[0] = (sequence % 1000) as i32;
+    state.jpos[..3].copy_from_slice(&[30.0, 90.0, 22.9]);
+    state.jpos_d[..3].copy_from_slice(&[30.0, 90.0, 22.9]);
+    state.enc_vals[0] = (sequence % 1000) as i32;
+    state.source_id = 1;
+    state.source_time_ns = now_ns();
+    state.seal(sequence);
+    state
+}
+
+/// Measures one way of waiting for `seconds`; adds its rows to the table.
+pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {
+    let mut world = World::start(wait, service_core)?;
+    let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
+    let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
+    let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
+    let mut whole = Vec::with_capacity((seconds * 1000) as usize);
+    let (mut missed, mut valid) = (0_u64, 0_u64);
+    let mut next = now_ns();
+    for sequence in 1..=WARM_UP + seconds * 1000 {
+        let sent = now_ns();
+        writer.send(&state(sequence)).map_err(|error| error.to_string())?;
+        bell.ring();
+        let answer = reader
+            .wait(sent + PATIENCE_NS, 0, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
+            .map_err(|error| error.to_string())?;
+        let took = now_ns() - sent;
+        if sequence > WARM_UP {
+            match answer {
+                Some(pose) => {
+                    whole.push(took);
+                    valid += u64::from(pose.arm[0].status == ArmStatus::Valid as u32);
+                }
+                None => missed += 1,
+            }
+        }
+        next = (next + PERIOD_NS).max(now_ns());
+        sleep_until_ns(next);
+    }
+    let stats = world.stop().ok_or("ravenposed left no statistics")?;
+    if valid * 10 < whole.len() as u64 * 9 {
+        return Err(format!("only {valid} of {} answers were valid: this measures fallback", whole.len()));
+    }
+    let mut row = quantiles(&mut whole).to_vec();
+    row.push(missed as f64);
+    table.row(&format!("{wait}: state sent -> pose read, two processes"), &row);
+    for name in ["input_to_output", "inference", "features", "publish", "wakeup"] {
+        if let Some(stage) = stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
+            let us = |ns: u64| ns as f64 / 1000.0;
+            table.row(&format!("    {name}"), &[us(stage.p50), us(stage.p99), us(stage.p999), us(stage.max), f64::NAN]);
+        }
+    }
+    Ok(())
+}
