@@ -288,8 +288,7 @@ impl<E: Estimator> Cycle<E> {
         pose.arms = connected;
         for index in 0..ARMS {
             if connected & (1 << index) == 0 {
-                self.arms[index].disconnect(&self.limits);
-                pose.arm[index] = ArmPose::ABSENT;
+                pose.arm[index] = self.arms[index].disconnect(&self.limits);
                 continue;
             }
             let arm = &mut self.arms[index];
@@ -534,15 +533,18 @@ impl<E: Estimator> Arm<E> {
         out.bound95_um = [f64::NAN; 3];
     }
 
-    fn disconnect(&mut self, limits: &Limits) {
+    fn disconnect(&mut self, limits: &Limits) -> ArmPose {
+        let mut flags = 0;
         if self.valid {
             self.reset_count = self.reset_count.wrapping_add(1);
+            flags = flag::RESET;
         }
         self.valid = false;
         self.recovering = false;
         self.correction_um = Vector3::zeros();
         self.hold = limits.good_cycles;
         self.frozen.reset();
+        ArmPose { flags, reset_count: self.reset_count, ..ArmPose::ABSENT }
     }
 }
 

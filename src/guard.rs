@@ -151,3 +151,71 @@ impl Domain {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn domain() -> Domain {
+        Domain { min: [-10.0; FEATURES], max: [10.0; FEATURES], center: [0.0; FEATURES], weight: [0.1; FEATURES], limit: 5.0 }
+    }
+
+    /// Zeros, but for what no robot has: joints within their stops.
+    fn features() -> [f32; FEATURES] {
+        let mut features = [0.0; FEATURES];
+        for feature in [57, 58, 89, 90] {
+            features[feature] = Guard::new(None).possible(feature).0;
+        }
+        features
+    }
+
+    #[test]
+    fn the_trained_range_is_exact_for_each_feature() {
+        for feature in 0..FEATURES {
+            let mut domain = domain();
+            let value = features()[feature];
+            domain.max = [200_000.0; FEATURES];
+            domain.weight = [0.0; FEATURES];
+            (domain.min[feature], domain.max[feature]) = (value, value);
+            let guard = Guard::new(Some(domain));
+            let mut tried = features();
+            assert_eq!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
+            tried[feature] = value.next_up();
+            assert_ne!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
+            tried[feature] = value.next_down();
+            assert_ne!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
+        }
+    }
+
+    #[test]
+    fn features_that_are_plausible_alone_may_be_outside_together() {
+        let mut domain = domain();
+        domain.max = [200.0; FEATURES];
+        domain.center = features();
+        let guard = Guard::new(Some(domain));
+        let mut tried = features();
+        assert_eq!(guard.check(&tried), Verdict { reasons: 0, score: 0.0 });
+        // 25 features at 10: the distance is 5 x 10 x 0.1 = 5, the edge.
+        for feature in 97..105 {
+            tried[feature] = 10.0;
+        }
+        for feature in 40..57 {
+            tried[feature] = 10.0;
+        }
+        let edge = guard.check(&tried);
+        assert!((edge.score - 1.0).abs() < 1e-6 && edge.reasons == 0, "{edge:?}");
+        tried[32] = 5.0;
+        let beyond = guard.check(&tried);
+        assert!(beyond.score > 1.0);
+        assert_eq!(beyond.reasons, flag::OUT_OF_DOMAIN);
+    }
+
+    #[test]
+    fn a_distance_that_overflows_is_outside_and_finite() {
+        let mut domain = domain();
+        domain.weight = [f32::MAX; FEATURES];
+        let verdict = Guard::new(Some(domain)).check(&features());
+        assert_ne!(verdict.reasons & flag::OUT_OF_DOMAIN, 0);
+        assert!(verdict.score.is_finite());
+    }
+}

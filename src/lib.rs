@@ -12,6 +12,7 @@ pub mod guard;
 pub mod histogram;
 pub mod model;
 pub mod network;
+pub mod phase;
 pub mod realtime;
 pub mod report;
 pub mod runner;

@@ -1,11 +1,12 @@
 //! The loop: gives the pure cycle a clock, shared memory and a way to wait.
 //!
 //! After [`Runner::open`] nothing here allocates, locks, blocks (but for the one waiting call) or panics;
-//! `tests/allocation.rs` and `tests/realtime.rs` prove it over a million turns.
+//! `tests/realtime.rs` proves it over a million turns.
 
 use crate::config::Wait;
 use crate::cycle::{Cycle, Estimator, Limits, Stopwatch};
 use crate::histogram::{Recorder, Stage};
+use crate::phase::{Found, PhaseLock};
 use crate::shared::{Event, EventSender, LinkCounters, Shared};
 use ravenpose_transport::{Listener, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ARMS, CorrectedPose, FALLBACK_REASONS, RavenState};
@@ -17,8 +18,6 @@ use std::time::Duration;
 const QUEUE: usize = 64;
 /// After this many periods without a state the loop stops polling around the expected time and looks once per period.
 const MISSES_MAX: u32 = 50;
-/// The loop sleeps at least this share of a period in `sleep` mode, so that real-time throttling never finds it.
-const SLEEP_SHARE: i64 = 4;
 
 /// A fault on demand, for tests of the watchdog and of overruns (`ravenposed --test-hook`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +47,15 @@ pub enum Ended {
     Reopen,
 }
 
+/// How a wait ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Waited {
+    /// The loop was looking when a state came, or when none did.
+    Polled,
+    /// The loop was asleep until now.
+    Slept,
+}
+
 struct Link {
     reader: Reader<RavenState>,
     writer: Writer<CorrectedPose>,
@@ -70,7 +78,9 @@ pub struct Runner<E> {
     cycle: Cycle<E>,
     limits: Limits,
     waiting: Waiting,
-    link: Link,
+    /// Absent only while it is opened anew.
+    link: Option<Link>,
+    phase: PhaseLock,
     pose: CorrectedPose,
     recorder: Recorder,
     events: EventSender,
@@ -125,10 +135,11 @@ impl<E: Estimator> Runner<E> {
         waiting: Waiting,
         (recorder, events, shared): (Recorder, EventSender, Arc<Shared>),
     ) -> Result<Self, TransportError> {
-        let link = Link::open(settings, waiting.wait)?;
+        let link = Some(Link::open(settings, waiting.wait)?);
         Ok(Self {
             cycle,
             limits,
+            phase: PhaseLock::new(limits.period_ns, waiting.spin_ns),
             waiting,
             link,
             pose: CorrectedPose::new(),
@@ -161,27 +172,29 @@ impl<E: Estimator> Runner<E> {
         }
     }
 
-    /// Opens the link anew after the shared files were removed under it. Not real-time: nothing flows then anyway.
+    /// Drops the link and opens it anew, after the shared files were removed under it. Not real-time: nothing flows then anyway.
     ///
     /// # Errors
-    /// Any [`TransportError`] of opening; the old link is still in place then.
+    /// Any [`TransportError`] of opening; there is no link then, call it again.
     pub fn reopen(&mut self, settings: &Settings) -> Result<(), TransportError> {
-        let opened = Link::open(settings, self.waiting.wait);
+        // Dropped first: what is left of the old services goes with their last user.
+        self.link = None;
+        self.shared.heartbeat.fetch_add(1, Relaxed);
+        self.link = Some(Link::open(settings, self.waiting.wait)?);
         self.shared.reopen.store(false, Relaxed);
-        self.link = opened?;
         self.report(Event::Reopened);
         Ok(())
     }
 
     /// One cycle: wait, take the newest state, answer it, publish, record.
     pub fn turn(&mut self) {
-        let wanted_ns = self.wait();
+        let waited = self.wait();
         let start_ns = now_ns();
         let mut laps = Laps { last_ns: start_ns, features_ns: 0, inference_ns: 0 };
         let accepted = self.cycle.counters().accepted;
         self.take(start_ns);
         let fresh = self.cycle.counters().accepted != accepted;
-        self.misses = if fresh { 0 } else { self.misses.saturating_add(1) };
+        self.learn(fresh, waited, start_ns);
         if self.cycle.step(start_ns, &mut laps, &mut self.pose) {
             self.run_test_hook();
             let finish_ns = now_ns();
@@ -192,57 +205,75 @@ impl<E: Estimator> Runner<E> {
             }
             self.report_changes(finish_ns - start_ns);
         }
-        if let Some(wanted_ns) = wanted_ns {
-            self.recorder.record(Stage::Wakeup, start_ns - wanted_ns);
-        }
         self.shared.show(self.cycle.counters(), &self.link_counters);
         self.shared.heartbeat.fetch_add(1, Relaxed);
         self.recorder.exchange();
     }
 
-    /// Waits for a state, at most until the next period or until the newest state becomes stale. Returns the time at which the loop
-    /// wanted to wake, if it slept.
-    fn wait(&mut self) -> Option<i64> {
+    /// Waits for a state, at most until the next one is overdue or the newest becomes stale.
+    fn wait(&mut self) -> Waited {
         let now = now_ns();
         let newest = self.cycle.newest().map(|state| state.source_time_ns.min(now));
         let period = self.limits.period_ns;
-        let expected = newest.map_or(now + period, |source| source + period * ((now - source) / period + 1));
         let stale = newest.map(|source| source + self.limits.stale_ns).filter(|&stale| stale > now).unwrap_or(i64::MAX);
         match self.waiting.wait {
             Wait::Spin => {
                 self.poll_until((now + period).min(stale));
-                None
+                Waited::Polled
+            }
+            Wait::Sleep if self.misses > MISSES_MAX => {
+                let wake = self.phase.expected_ns(newest, now).min(stale);
+                sleep_until_ns(wake);
+                self.recorder.record(Stage::Wakeup, now_ns() - wake);
+                Waited::Slept
             }
             Wait::Sleep => {
-                if self.misses > MISSES_MAX {
-                    sleep_until_ns(expected.min(stale));
-                    return Some(expected.min(stale));
-                }
-                let spin = self.waiting.spin_ns.min(period / 2);
-                let grace = spin.max(period / 4).min(period - spin - period / SLEEP_SHARE);
-                let wake = (expected - spin).max(now).min(stale);
+                let plan = self.phase.plan(newest, now);
+                let wake = plan.wake_ns.min(stale);
                 sleep_until_ns(wake);
-                let woke = now_ns();
-                self.poll_until((expected + grace).min(stale));
                 if wake > now {
-                    self.recorder.record(Stage::Wakeup, woke - wake);
+                    self.recorder.record(Stage::Wakeup, now_ns() - wake);
                 }
-                None
+                if self.waiting_state() {
+                    return Waited::Slept;
+                }
+                self.poll_until(plan.deadline_ns.min(stale));
+                Waited::Polled
             }
             Wait::Event => {
-                let deadline = (expected + period / 4).min(stale);
+                let deadline = (self.phase.expected_ns(newest, now) + period / 4).min(stale);
                 let mut left = deadline - now;
-                while left > 0 && !self.waiting_state() {
-                    if let Some(listener) = &self.link.listener {
+                while left > 0 && !self.waiting_state() && !self.shared.stop.load(Relaxed) {
+                    if let Some(listener) = self.listener() {
                         listener.wait(Duration::from_nanos(left as u64));
                     }
                     left = deadline - now_ns();
-                    if left > 0 && self.shared.stop.load(Relaxed) {
-                        break;
-                    }
                 }
-                None
+                Waited::Polled
             }
+        }
+    }
+
+    fn listener(&self) -> Option<&Listener> {
+        self.link.as_ref().and_then(|link| link.listener.as_ref())
+    }
+
+    /// Tells the phase lock how a state was found, or that none came.
+    fn learn(&mut self, fresh: bool, waited: Waited, now_ns: i64) {
+        if !fresh {
+            self.misses = self.misses.saturating_add(1);
+            return;
+        }
+        let found = match (waited, self.misses) {
+            (Waited::Polled, _) => Found::Polling,
+            (Waited::Slept, 0) => Found::Waiting,
+            (Waited::Slept, 1..=MISSES_MAX) => Found::AfterMiss,
+            // Out of a long silence: where in the period it came is unknown.
+            (Waited::Slept, _) => Found::Waiting,
+        };
+        self.misses = 0;
+        if let Some(state) = self.cycle.newest() {
+            self.phase.learn(found, state.source_time_ns, now_ns);
         }
     }
 
@@ -254,18 +285,20 @@ impl<E: Estimator> Runner<E> {
     }
 
     fn waiting_state(&self) -> bool {
-        self.link.reader.has_message()
+        self.link.as_ref().is_some_and(|link| link.reader.has_message())
     }
 
     fn take(&mut self, now_ns: i64) {
         let cycle = &mut self.cycle;
-        if self.link.reader.drain(|state| cycle.offer(state, now_ns)).is_err() {
+        if let Some(link) = &self.link
+            && link.reader.drain(|state| cycle.offer(state, now_ns)).is_err()
+        {
             self.link_counters.receive_failures += 1;
         }
     }
 
     fn send(&mut self) {
-        if self.link.writer.send(&self.pose).is_err() {
+        if self.link.as_ref().is_none_or(|link| link.writer.send(&self.pose).is_err()) {
             self.link_counters.send_failures += 1;
         }
         self.shared.show_arms(&self.pose);

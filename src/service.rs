@@ -106,7 +106,7 @@ fn start(arguments: &Arguments) -> Result<ExitCode, String> {
         return Ok(ExitCode::SUCCESS);
     }
     let mut missing = Vec::new();
-    prepare_machine(&config, &mut missing);
+    let latency = prepare_machine(&config, &mut missing);
     if let Some(first) = missing.first()
         && !config.allow_degraded
     {
@@ -115,26 +115,15 @@ fn start(arguments: &Arguments) -> Result<ExitCode, String> {
     for problem in &missing {
         say(&format!("NOT REAL TIME: {problem}"));
     }
-    let latency = if config.hold_cpu_dma_latency { permit(&config, realtime::hold_cpu_dma_latency())? } else { None };
     let standing = if missing.is_empty() { 0 } else { flag::NOT_REALTIME };
     let code = serve(&config, prepared, standing, arguments.test_hook);
     drop(latency);
     code
 }
 
-fn permit<T>(config: &Config, granted: Result<T, Missing>) -> Result<Option<T>, String> {
-    match granted {
-        Ok(value) => Ok(Some(value)),
-        Err(problem) if config.allow_degraded => {
-            say(&format!("NOT REAL TIME: {problem}"));
-            Ok(None)
-        }
-        Err(problem) => Err(format!("{problem}, or allow_degraded = true")),
-    }
-}
-
 /// Locks memory, and tries on a thread of its own what the loop will need, so that a refusal comes before anything starts.
-fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) {
+/// Gives the file that keeps the processor out of deep idle states, if that is asked for.
+fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::fs::File> {
     if config.wait == Wait::Spin {
         missing.extend(realtime::throttling().err());
     }
@@ -147,6 +136,10 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) {
         missing.extend(pinned.and_then(Result::err));
         missing.extend(fifo.err());
     }
+    if !config.hold_cpu_dma_latency {
+        return None;
+    }
+    realtime::hold_cpu_dma_latency().map_err(|problem| missing.push(problem)).ok()
 }
 
 fn load_models(config: &Config) -> Result<Prepared, String> {
@@ -245,6 +238,7 @@ fn spawn_loop(
             // Refusals were weighed before; whoever got here without these rights was allowed to.
             let _ = config.core.map(realtime::pin);
             let _ = realtime::set_fifo(config.priority);
+            let shared = ends.2.clone();
             let waiting = Waiting { wait: config.wait, spin_ns: config.spin_ns };
             let mut runner = match Runner::open(&config.transport, cycle, config.limits, waiting, ends) {
                 Ok(runner) => runner,
@@ -258,8 +252,9 @@ fn spawn_loop(
             }
             let _ = ready.send(Ok(()));
             while runner.run() == Ended::Reopen {
-                // If others still hold the place the old link stays, and the ordinary thread asks again.
-                let _ = runner.reopen(&config.transport);
+                while runner.reopen(&config.transport).is_err() && !shared.stop.load(Relaxed) {
+                    std::thread::sleep(TICK);
+                }
             }
             Ok(runner.into_recorder().into_active())
         })

@@ -6,7 +6,7 @@ use crate::report::{Log, Stats};
 use crate::say;
 use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
-use ravenpose_transport::{Message, Probe};
+use ravenpose_transport::{Message, Probe, Settings};
 use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, RavenState, flag, flag_names};
 use sd_notify::NotifyState;
 use std::path::{Path, PathBuf};
@@ -25,6 +25,8 @@ const STUCK_TICKS: u32 = 4;
 const STUCK_TICKS_DEGRADED: u32 = 100;
 /// How often statistics are written and the link is probed.
 const SECOND: Duration = Duration::from_secs(1);
+/// For this long after the link was opened anew it is opened again if newcomers still do not find it.
+const REOPEN_AGAIN: Duration = Duration::from_secs(20);
 /// How long the last files may take.
 const WRITE_MAX: Duration = Duration::from_millis(500);
 
@@ -46,8 +48,13 @@ pub struct Watch {
     heartbeat: u64,
     still: u32,
     stuck_ticks: u32,
+    settings: Settings,
     probe: Probe,
+    /// States taken in when the link was last checked.
+    accepted: u64,
     unreachable: u32,
+    /// When the link was first opened anew after it had worked.
+    reopened: Option<Instant>,
     silent_since: Option<Instant>,
     silence_explained: bool,
 }
@@ -87,8 +94,11 @@ impl Watch {
             heartbeat: 0,
             still: 0,
             stuck_ticks: if realtime { STUCK_TICKS } else { STUCK_TICKS_DEGRADED },
+            settings: config.transport.clone(),
+            accepted: 0,
             probe: Probe::open(&config.transport).map_err(|error| error.to_string())?,
             unreachable: 0,
+            reopened: None,
             silent_since: None,
             silence_explained: false,
         })
@@ -150,14 +160,35 @@ impl Watch {
     fn check_link(&mut self) {
         let (publishers, readers) = self.probe.count::<RavenState>();
         let (poses, _) = self.probe.count::<CorrectedPose>();
-        self.unreachable = if readers > 0 && poses > 0 { 0 } else { self.unreachable + 1 };
-        if self.unreachable >= 2 {
+        let accepted = self.shared.counters()[1];
+        let flows = std::mem::replace(&mut self.accepted, accepted) != accepted;
+        if readers > 0 && poses > 0 {
             self.unreachable = 0;
+        } else {
+            self.unreachable += 1;
+            // The probe itself may hang on what was removed.
+            if let Ok(probe) = Probe::open(&self.settings) {
+                self.probe = probe;
+            }
+        }
+        // Services of one name share their file names: whoever leaves the old one last also removes the new one's files. So one
+        // opening may not be enough, and what flows after one may be cut off again.
+        let settling = self.reopened.is_some_and(|reopened| reopened.elapsed() < REOPEN_AGAIN);
+        if self.unreachable == 2 && flows && !settling {
+            // What works is left alone: it would only be interrupted.
+            say(
+                "the shared files were removed under the service (RemoveIPC, a tmp cleaner?); the running link goes on, newcomers cannot join until the service is restarted",
+            );
+        } else if self.unreachable >= 2 && (!flows || settling) && !self.shared.reopen.load(Relaxed) {
+            self.unreachable = 0;
+            if !settling {
+                self.reopened = Some(Instant::now());
+            }
             say("the shared files were removed under the service (RemoveIPC, a tmp cleaner?); opening the link anew");
             self.shared.reopen.store(true, Relaxed);
         }
         let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
-        let never = self.shared.counters()[1] == 0;
+        let never = accepted == 0;
         if publishers == 0 || !(stale || never) {
             self.silent_since = None;
             self.silence_explained = false;

@@ -261,26 +261,66 @@ fn a_service_whose_files_were_removed_opens_its_link_anew() {
     let config = world.config(CONFIG);
     let _service = world.start(&config, &[]);
     let mut publisher = world.role(test, "publisher");
-    let wait_for_poses = |what: &str| {
+    let fresh_pose = |what: &str| {
+        // One newcomer that stays: services of one name share their file names, so those who come and go now disturb each other.
+        let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).expect("a newcomer");
         let begun = Instant::now();
-        // A newcomer each time: the old reader may hang on the dead service.
         loop {
-            if let Ok(reader) = Reader::<CorrectedPose>::open(&world.settings, 1) {
-                std::thread::sleep(Duration::from_millis(50));
-                if let Ok(Some(pose)) = reader.latest()
-                    && now_ns() - pose.source_time_ns < POSE_AGE_MAX_NS
-                {
-                    return;
-                }
+            if let Ok(Some(pose)) = reader.latest()
+                && now_ns() - pose.source_time_ns < POSE_AGE_MAX_NS
+            {
+                return;
             }
-            assert!(begun.elapsed() < Duration::from_secs(15), "{what}\n{}", world.log());
+            assert!(begun.elapsed() < Duration::from_secs(10), "{what}\n{}", world.log());
+            std::thread::sleep(Duration::from_millis(1));
         }
     };
-    wait_for_poses("poses at first");
+    fresh_pose("poses at first");
     publisher.kill();
     common::remove_shared_memory(&world.settings.prefix);
     let _ = std::fs::remove_dir_all(&world.settings.root);
     let _publisher = world.role(test, "publisher");
-    wait_for_poses("poses after the files were removed");
-    assert!(world.log().contains("opening the link anew"), "{}", world.log());
+    let begun = Instant::now();
+    while !world.log().contains("the link was opened anew") {
+        assert!(begun.elapsed() < Duration::from_secs(10), "{}", world.log());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    fresh_pose("poses after the files were removed");
+    // Now it is left alone.
+    let opened = world.log().matches("opening the link anew").count();
+    std::thread::sleep(Duration::from_secs(5));
+    fresh_pose("poses some seconds later");
+    assert_eq!(world.log().matches("opening the link anew").count(), opened, "{}", world.log());
+}
+
+#[test]
+fn a_working_link_is_left_alone_when_its_files_are_removed() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let world = World::new("robbed");
+    let config = world.config(CONFIG);
+    let _service = world.start(&config, &[]);
+    let reader = world.poses();
+    let _publisher = world.role("a_working_link_is_left_alone_when_its_files_are_removed", "publisher");
+    let begun = Instant::now();
+    while reader.next().expect("pose").is_none() {
+        assert!(begun.elapsed() < Duration::from_secs(10), "{}", world.log());
+    }
+    common::remove_shared_memory(&world.settings.prefix);
+    let begun = Instant::now();
+    let (mut poses, mut last) = (0, None);
+    while begun.elapsed() < Duration::from_secs(5) {
+        while let Some(pose) = reader.next().expect("pose") {
+            poses += 1;
+            last = Some(pose);
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    println!("{poses} poses in 5 s after the files were removed");
+    assert!(poses > 4_000, "{}", world.log());
+    assert_eq!(last.expect("a pose").arm[0].status, VALID);
+    let words = world.log();
+    assert_eq!(words.matches("newcomers cannot join").count(), 1, "{words}");
+    assert!(!words.contains("opening the link anew"), "{words}");
 }

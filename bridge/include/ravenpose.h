@@ -29,6 +29,7 @@
 #define RAVENPOSE_ERROR_RECEIVE (-9)
 #define RAVENPOSE_ERROR_TORN (-10)
 #define RAVENPOSE_ERROR_INTERNAL (-11)
+#define RAVENPOSE_ERROR_ABSENT (-12)
 
 /* Status of an arm's estimate. */
 #define RAVENPOSE_STATUS_ABSENT 0u

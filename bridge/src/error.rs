@@ -35,9 +35,11 @@ pub enum Code {
     Torn = -10,
     /// A defect of this library; the call had no effect.
     Internal = -11,
+    /// The arm is not connected.
+    Absent = -12,
 }
 
-const TEXTS: [(Code, &CStr); 14] = [
+const TEXTS: [(Code, &CStr); 15] = [
     (Code::Ok, c"done"),
     (Code::NothingNew, c"no new pose since the last one taken"),
     (Code::Raw, c"raw position: the correction may not be used now"),
@@ -52,6 +54,7 @@ const TEXTS: [(Code, &CStr); 14] = [
     (Code::Receive, c"a publisher's memory cannot be mapped"),
     (Code::Torn, c"a message of another layout, or torn"),
     (Code::Internal, c"internal error: please report it"),
+    (Code::Absent, c"the arm is not connected"),
 ];
 
 impl Code {

@@ -268,6 +268,9 @@ pub unsafe extern "C" fn ravenpose_position(pose: *const CorrectedPose, arm: u32
     if pose.admit().is_err() {
         return Code::Torn as i32;
     }
+    if estimate.status == ArmStatus::Absent as u32 {
+        return Code::Absent as i32;
+    }
     let fresh = now_ns.saturating_sub(pose.source_time_ns) < RAVENPOSE_POSE_AGE_MAX_NS;
     let usable = fresh && estimate.status == ArmStatus::Valid as u32;
     let position = if usable { &estimate.corrected_position_um } else { &estimate.raw_position_um };

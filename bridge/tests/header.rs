@@ -34,6 +34,7 @@ fn tables() -> String {
         ("ERROR_RECEIVE", Code::Receive),
         ("ERROR_TORN", Code::Torn),
         ("ERROR_INTERNAL", Code::Internal),
+        ("ERROR_ABSENT", Code::Absent),
     ] {
         let _ = writeln!(text, "#define RAVENPOSE_{name} ({})", code as i32);
     }

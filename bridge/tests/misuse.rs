@@ -147,6 +147,7 @@ fn the_consumer_rule_gives_raw_unless_everything_is_right() {
     let mut fallback = good;
     fallback.arm[0].status = ArmStatus::Fallback as u32;
     assert_eq!(rule(&fallback, 0, 1_000_000_001), (Code::Raw as i32, [1.0, 2.0, 3.0]));
+    assert_eq!(rule(&good, 1, 1_000_000_001), (Code::Absent as i32, [0.0; 3]), "no arm, no position");
     let mut torn = good;
     torn.guard_tail = 4;
     assert_eq!(rule(&torn, 0, 1_000_000_001).0, Code::Torn as i32);
@@ -154,10 +155,10 @@ fn the_consumer_rule_gives_raw_unless_everything_is_right() {
 
 #[test]
 fn every_code_has_a_text() {
-    for code in -12..=3 {
+    for code in -13..=3 {
         // SAFETY: a static text.
         let text = unsafe { CStr::from_ptr(ravenpose_error_text(code)) }.to_str().expect("UTF-8");
         assert!(!text.is_empty());
-        assert_eq!(text == "unknown code", !(-11..=2).contains(&code), "{code}");
+        assert_eq!(text == "unknown code", !(-12..=2).contains(&code), "{code}");
     }
 }

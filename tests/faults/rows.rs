@@ -522,8 +522,10 @@ fn an_arm_that_is_not_connected_is_absent_and_returns_through_settling() {
     state.arms = 1;
     let pose = bench.run(&[state]).expect("answered");
     assert_eq!((pose.arm[0].status, pose.arm[1].status, pose.arms), (VALID, ArmStatus::Absent as u32, 1));
+    assert_eq!((pose.arm[1].flags, pose.arm[1].reset_count), (flag::RESET, 1), "the drop is announced");
     let pose = bench.good();
     assert_eq!(pose.arm[1].status, FALLBACK);
+    assert_eq!(pose.arm[1].reset_count, 1);
     assert_ne!(pose.arm[1].flags & flag::SETTLING, 0);
 }
 

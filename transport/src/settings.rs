@@ -4,7 +4,7 @@ use crate::TransportError;
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString};
 use std::time::Duration;
 
-const CREATION_TIMEOUT: Duration = Duration::from_millis(1);
+const CREATION_TIMEOUT: Duration = Duration::from_micros(100);
 
 /// Prefix and root of the shared files. All parties that want to talk must agree on both; the defaults are those of iceoryx2, so
 /// that any iceoryx2 client finds us.
