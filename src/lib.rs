@@ -3,6 +3,8 @@
 //! Research software, no clinical use. `ARCHITECTURE.md` has the map. [`cycle`] is one period as a pure function; [`runner`] gives it a
 //! clock and shared memory; [`service`] starts it and is the ordinary thread beside it; everything else serves these three.
 
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::todo, clippy::unimplemented))]
+
 pub mod card;
 pub mod check;
 pub mod config;

@@ -1,4 +1,6 @@
 //! The network alone: our plan beside tract's runner and beside the floor, which is reading the weights once.
+//!
+//! This module contains `unsafe`: a call of a function compiled for an instruction set that was found on this machine.
 
 use crate::table::{Table, quantiles};
 use ravenpose::network::{InstructionSet, Plan};

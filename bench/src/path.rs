@@ -1,5 +1,7 @@
 //! The whole path through shared memory: this process publishes at 1 kHz on one core, `ravenposed` answers on another, and this
 //! process polls for the answer. Real processes, real service, one arm.
+//!
+//! This module contains `unsafe`: a signal to a child process.
 
 use crate::table::{Table, quantiles};
 use ravenpose::report::Stats;

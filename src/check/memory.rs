@@ -1,4 +1,6 @@
 //! Memory that must not move, and the transport's shared files.
+//!
+//! This module contains `unsafe`: asking for the size of a file system, which has no safe call in our tree.
 
 use super::limits::user_id;
 use super::{Finding, Tree};

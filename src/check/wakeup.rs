@@ -1,4 +1,6 @@
 //! How late does this machine wake a thread? Measured as cyclictest does.
+//!
+//! This module contains `unsafe`: the scheduler and clock calls of the measuring thread.
 
 use super::{Finding, Level};
 use rustix::thread::{ClockId as SleepClock, CpuSet, clock_nanosleep_absolute, sched_setaffinity};

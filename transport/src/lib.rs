@@ -4,6 +4,8 @@
 //! live. The settings are made here, in code, so that no configuration file in some working directory can change them.
 //! After `open`, [`Writer::loan`], [`Writer::send`], [`Reader::drain`] and [`Reader::latest`] allocate nothing, lock nothing and make
 //! no system call, but for the one call in which a new peer appears (it is mapped then).
+//!
+//! This module contains `unsafe`: reading the clock and sleeping until a time.
 
 mod error;
 mod event;

@@ -1,4 +1,6 @@
 //! Publisher and reader of one message type.
+//!
+//! This module contains `unsafe`: handing over a message that C has written in place.
 
 use crate::{Settings, TransportError, now_ns, sleep_until_ns};
 use iceoryx2::node::{Node, NodeBuilder};

@@ -13,6 +13,8 @@
 //! | 40 | 24 bytes | zero |
 //!
 //! Record `i` has sequence `i + 1` and a time relative to the start; whoever replays it writes the time anew.
+//!
+//! This module contains `unsafe`: records are written and read as the bytes of a repr(C) struct.
 
 use std::fs::File;
 use std::io::{Read, Write};

@@ -1,0 +1,61 @@
+//! House rules that a machine can check: `unsafe` only in modules that say so in their first lines, and no stubs.
+
+use std::path::{Path, PathBuf};
+
+fn sources(dir: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(dir).expect("folder").flatten() {
+        let path = entry.path();
+        let name = entry.file_name();
+        if path.is_dir() {
+            if name != "target" && name != "build" && name != ".git" {
+                sources(&path, found);
+            }
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+fn all() -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    sources(Path::new(env!("CARGO_MANIFEST_DIR")), &mut found);
+    assert!(found.len() > 50);
+    found
+        .into_iter()
+        .map(|path| {
+            let text = std::fs::read_to_string(&path).expect("UTF-8");
+            (path, text)
+        })
+        .collect()
+}
+
+#[test]
+fn unsafe_stands_only_in_modules_that_name_it() {
+    for (path, text) in all() {
+        let is_test = path.components().any(|part| part.as_os_str() == "tests");
+        let uses = text.lines().any(|line| {
+            let code = line.split("//").next().unwrap_or_default();
+            code.contains("unsafe {")
+                || code.contains("unsafe fn")
+                || code.contains("unsafe impl")
+                || code.contains("unsafe extern")
+        });
+        let introduction: String = text.lines().take_while(|line| line.starts_with("//!")).collect();
+        assert!(
+            is_test || !uses || introduction.contains("`unsafe`"),
+            "{}: uses unsafe and does not say so at its top",
+            path.display()
+        );
+    }
+}
+
+#[test]
+fn there_are_no_stubs_and_no_ignored_tests() {
+    let marks =
+        [concat!("to", "do!("), concat!("unimple", "mented!("), concat!("#[ig", "nore"), concat!("FIX", "ME"), concat!("XX", "X")];
+    for (path, text) in all() {
+        for mark in marks {
+            assert!(!text.contains(mark), "{}: {mark}", path.display());
+        }
+    }
+}
