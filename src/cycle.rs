@@ -204,7 +204,8 @@ impl<E: Estimator> Cycle<E> {
 
     /// Takes in a message from the link. Call for each waiting one, oldest first, then [`Cycle::step`].
     pub fn offer(&mut self, state: &RavenState, now_ns: i64) {
-        if state.admit().is_err() || state.source_time_ns > now_ns.saturating_add(FUTURE_NS) {
+        // `CLOCK_MONOTONIC` is never negative; refusing what is keeps every later difference of times in range.
+        if state.admit().is_err() || !(0..=now_ns.saturating_add(FUTURE_NS)).contains(&state.source_time_ns) {
             count(&mut self.counters.refused);
             return;
         }

@@ -196,12 +196,8 @@ mod tests {
         let mut tried = features();
         assert_eq!(guard.check(&tried), Verdict { reasons: 0, score: 0.0 });
         // 25 features at 10: the distance is 5 x 10 x 0.1 = 5, the edge.
-        for feature in 97..105 {
-            tried[feature] = 10.0;
-        }
-        for feature in 40..57 {
-            tried[feature] = 10.0;
-        }
+        tried[97..105].fill(10.0);
+        tried[40..57].fill(10.0);
         let edge = guard.check(&tried);
         assert!((edge.score - 1.0).abs() < 1e-6 && edge.reasons == 0, "{edge:?}");
         tried[32] = 5.0;

@@ -6,6 +6,7 @@
 
 /// The lock.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "the unit belongs to each name")]
 pub struct PhaseLock {
     period_ns: i64,
     spin_ns: i64,
@@ -39,7 +40,7 @@ impl PhaseLock {
     pub fn new(period_ns: i64, spin_ns: i64) -> Self {
         let spin_ns = spin_ns.min(period_ns / 2);
         // At least a quarter of each period is slept, so that real-time throttling never finds a loop that does not sleep.
-        let grace_ns = spin_ns.max(period_ns / 4).min(period_ns - spin_ns - period_ns / 4);
+        let grace_ns = period_ns - spin_ns - period_ns / 4;
         Self { period_ns, spin_ns, grace_ns, offset_ns: 0 }
     }
 

@@ -59,3 +59,13 @@ fn there_are_no_stubs_and_no_ignored_tests() {
         }
     }
 }
+
+#[test]
+fn every_flag_and_status_is_in_the_document_with_its_bit() {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/flags.md")).expect("docs/flags.md");
+    for flag in ravenpose_wire::FLAGS {
+        let bit = flag.bit.trailing_zeros();
+        let start = format!("| {bit} | `{}` |", flag.name);
+        assert!(text.lines().any(|line| line.starts_with(&start)), "docs/flags.md has no row that begins with {start}");
+    }
+}

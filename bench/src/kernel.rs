@@ -54,7 +54,12 @@ pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Table, String> {
         format!("ravenpose f32, {}", plan.instruction_set().name()),
         format!("ravenpose f32, {}", narrow.instruction_set().name()),
         "tract, kept state".to_owned(),
+        "ravenpose f32, denormal inputs".to_owned(),
+        "ravenpose f32, inputs that saturate every sigmoid".to_owned(),
     ];
+    let denormal = vec![vec![1e-40_f32; 118]];
+    let saturating: Vec<Vec<f32>> =
+        (0..INPUTS).map(|row| (0..118).map(|i| if (row * 7 + i) % 3 == 0 { 1e4 } else { -1e4 }).collect()).collect();
     let mut medians = vec![Vec::new(); names.len()];
     let mut times = vec![Vec::new(); names.len()];
     let mut sink = 0.0_f32;
@@ -64,11 +69,16 @@ pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Table, String> {
             let mut output = [0.0_f32; 3];
             let mut taken = Vec::with_capacity(runs);
             for count in 0..WARM_UP + runs {
-                let input = &inputs[count % INPUTS];
+                let set = match engine {
+                    4 => &denormal,
+                    5 => &saturating,
+                    _ => &inputs,
+                };
+                let input = &set[count % set.len()];
                 let start = now_ns();
                 match engine {
                     0 => sink += stream(&weights),
-                    1 => plan.run(input, &mut output),
+                    1 | 4 | 5 => plan.run(input, &mut output),
                     2 => narrow.run(input, &mut output),
                     _ => sink += oracle.run(input).map_err(|error| error.to_string())?[0],
                 }

@@ -105,12 +105,17 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
     let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
     let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
     let mut whole = Vec::with_capacity((seconds * 1000) as usize);
+    let mut handed_over = Vec::with_capacity((seconds * 1000) as usize);
     let (mut missed, mut valid) = (0_u64, 0_u64);
     let mut next = now_ns();
     for sequence in 1..=WARM_UP + seconds * 1000 {
+        let state = state(sequence);
         let sent = now_ns();
-        writer.send(&state(sequence)).map_err(|error| error.to_string())?;
+        writer.send(&state).map_err(|error| error.to_string())?;
         bell.ring();
+        if sequence > WARM_UP {
+            handed_over.push(now_ns() - sent);
+        }
         let answer = reader
             .wait(sent + PATIENCE_NS, 0, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
             .map_err(|error| error.to_string())?;
@@ -134,6 +139,9 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
     let mut row = quantiles(&mut whole).to_vec();
     row.push(missed as f64);
     table.row(&format!("{wait}: state sent -> pose read, two processes"), &row);
+    let mut row = quantiles(&mut handed_over).to_vec();
+    row.push(f64::NAN);
+    table.row("    the robot's own publish call", &row);
     for name in ["input_to_output", "inference", "features", "publish", "wakeup"] {
         if let Some(stage) = stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
             let us = |ns: u64| ns as f64 / 1000.0;

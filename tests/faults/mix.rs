@@ -167,7 +167,7 @@ impl World {
             }
             7 => {
                 let mut early = message;
-                early.source_time_ns += 10_000 * MS;
+                early.source_time_ns = [early.source_time_ns + 10_000 * MS, i64::MAX, i64::MIN, -1][self.rng.below(4) as usize];
                 self.enqueue(early);
             }
             8 => {

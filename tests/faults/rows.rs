@@ -530,13 +530,16 @@ fn an_arm_that_is_not_connected_is_absent_and_returns_through_settling() {
 }
 
 #[test]
-fn a_message_from_the_future_is_refused() {
+fn a_message_with_a_time_of_another_clock_is_refused() {
     let mut bench = Bench::new();
     bench.settle();
-    let mut state = bench.next_state();
-    state.source_time_ns = bench.now + 2 * MS;
-    assert!(bench.run(&[state]).is_none());
-    assert_eq!(bench.cycle.counters().refused, 1);
+    for (count, time) in [bench.now + 3 * MS, i64::MAX, -1, i64::MIN].into_iter().enumerate() {
+        let mut state = bench.next_state();
+        bench.now -= MS;
+        state.source_time_ns = time;
+        assert!(bench.run(&[state]).is_none());
+        assert_eq!(bench.cycle.counters().refused, count as u64 + 1);
+    }
 }
 
 #[test]
