@@ -156,7 +156,7 @@ impl Config {
 fn limits(mut table: Table) -> Result<Limits, ConfigError> {
     let default = Limits::default();
     let (stale_at, period_at) = (table.place("stale_us"), table.place("period_us"));
-    let period_us = table.integer("period_us", 100..=100_000)?.unwrap_or(1000);
+    let period_us = table.integer("period_us", 100..=10_000)?.unwrap_or(1000);
     let limits = Limits {
         period_ns: period_us * 1000,
         stale_ns: table.integer("stale_us", 100..=1_000_000)?.map_or(default.stale_ns, |us| us * 1000),

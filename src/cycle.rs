@@ -150,9 +150,9 @@ pub struct Cycle<E> {
     pending: bool,
     new_source: bool,
     saw_duplicate: bool,
-    gap: bool,
     late_in_row: u32,
     counters: Counters,
+    first_sequence: u64,
     features: [f32; FEATURES],
 }
 
@@ -180,10 +180,19 @@ impl<E: Estimator> Cycle<E> {
             pending: false,
             new_source: false,
             saw_duplicate: false,
-            gap: false,
             late_in_row: 0,
             counters: Counters::default(),
+            first_sequence: 0,
             features: [0.0; FEATURES],
+        }
+    }
+
+    /// Starts this run's numbers above those of any earlier run on this machine: the sequence from the clock in µs (it rises by about
+    /// one per ms), the reset counts from the clock in ms. So a restart is seen as an announced step, and numbers never fall.
+    pub fn begin_at(&mut self, now_ns: i64) {
+        self.first_sequence = (now_ns.max(0) / 1000) as u64;
+        for arm in &mut self.arms {
+            arm.reset_count = (now_ns.max(0) / 1_000_000) as u32;
         }
     }
 
@@ -204,6 +213,8 @@ impl<E: Estimator> Cycle<E> {
 
     /// Takes in a message from the link. Call for each waiting one, oldest first, then [`Cycle::step`].
     pub fn offer(&mut self, state: &RavenState, now_ns: i64) {
+        // Copied first, judged afterwards: whoever still writes to the shared message cannot change what was judged.
+        let state = *state;
         // `CLOCK_MONOTONIC` is never negative; refusing what is keeps every later difference of times in range.
         if state.admit().is_err() || !(0..=now_ns.saturating_add(FUTURE_NS)).contains(&state.source_time_ns) {
             count(&mut self.counters.refused);
@@ -238,7 +249,6 @@ impl<E: Estimator> Cycle<E> {
                     self.begin_source();
                 } else if missing > 0 {
                     self.counters.lost = self.counters.lost.wrapping_add(missing);
-                    self.gap = true;
                 }
             }
         }
@@ -246,7 +256,7 @@ impl<E: Estimator> Cycle<E> {
             count(&mut self.counters.skipped);
         }
         count(&mut self.counters.accepted);
-        self.newest = *state;
+        self.newest = state;
         self.have_state = true;
         self.pending = true;
     }
@@ -254,7 +264,6 @@ impl<E: Estimator> Cycle<E> {
     fn begin_source(&mut self) {
         count(&mut self.counters.sources);
         self.new_source = true;
-        self.gap = true;
     }
 
     /// Answers the newest state, or the lack of one. Returns whether `pose` is to be published after [`Cycle::finish`].
@@ -284,7 +293,6 @@ impl<E: Estimator> Cycle<E> {
         if self.late_in_row >= self.limits.late_degraded {
             information |= flag::DEGRADED;
         }
-        let gap = std::mem::take(&mut self.gap);
         let connected = self.newest.connected();
         pose.arms = connected;
         for index in 0..ARMS {
@@ -293,7 +301,7 @@ impl<E: Estimator> Cycle<E> {
                 continue;
             }
             let arm = &mut self.arms[index];
-            if gap {
+            if common & flag::NEW_SOURCE != 0 {
                 arm.frozen.reset();
             }
             // A repeated message says only that the input is stale: its numbers were judged when they were new.
@@ -341,6 +349,10 @@ impl<E: Estimator> Cycle<E> {
         if took_ns > self.limits.period_ns {
             count(&mut self.counters.overruns);
         }
+        if now_ns.saturating_sub(pose.source_time_ns) >= self.limits.stale_ns {
+            // It was fresh when it was taken; whatever held the cycle up since has made it stale.
+            reasons |= flag::INPUT_STALE;
+        }
         if stopping {
             reasons |= flag::STOPPING;
         }
@@ -362,7 +374,7 @@ impl<E: Estimator> Cycle<E> {
         pose.overruns = self.counters.overruns;
         pose.publish_time_ns = now_ns;
         self.counters.published = self.counters.published.wrapping_add(1);
-        pose.seal(self.counters.published);
+        pose.seal(self.first_sequence.wrapping_add(self.counters.published));
     }
 
     /// Composes the last message of a stopping service from the newest state; `false` if there never was one.
@@ -479,6 +491,7 @@ impl<E: Estimator> Arm<E> {
         if !self.valid {
             self.valid = true;
             self.ever_valid = true;
+            self.hold_flags = 0;
             self.recovering = true;
         }
         let step_max = if self.recovering { limits.recover_um } else { limits.rate_um };
@@ -514,9 +527,9 @@ impl<E: Estimator> Arm<E> {
         self.recovering = false;
         self.correction_um = Vector3::zeros();
         self.hold = limits.good_cycles;
-        self.hold_flags = reasons & flag::NEW_SOURCE;
+        self.hold_flags |= reasons & flag::NEW_SOURCE;
         out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING);
-        self.show_raw(reasons, out);
+        self.show_raw(reasons | self.hold_flags, out);
         if announced {
             out.flags |= flag::RESET;
         }

@@ -26,5 +26,7 @@ pub mod writer;
 
 /// A line in the log; the loop itself never calls this.
 pub(crate) fn say(message: &str) {
-    eprintln!("ravenposed: {message}");
+    use std::io::Write;
+    // Not `eprintln!`: it panics when nobody reads any more.
+    let _ = writeln!(std::io::stderr(), "ravenposed: {message}");
 }

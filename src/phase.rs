@@ -66,7 +66,7 @@ impl PhaseLock {
         const STEP_NS: i64 = 20_000;
         let offset = match found {
             Found::Polling => {
-                let seen = (now_ns - stamp_ns).clamp(0, self.period_ns - 1);
+                let seen = (now_ns - stamp_ns).rem_euclid(self.period_ns);
                 self.offset_ns + (seen - self.offset_ns) / 4
             }
             Found::Waiting => self.offset_ns - STEP_NS,

@@ -181,11 +181,11 @@ impl Log {
         Ok(Self { dir: dir.to_owned(), path: dir.join(format!("ravenposed-{seconds}-{}.hlog", std::process::id())), started })
     }
 
-    /// Appends one interval and writes the `.hgrm` files of everything so far.
+    /// Appends one interval.
     ///
     /// # Errors
-    /// The system's; the log then ends with its last whole interval, and the old `.hgrm` files are intact.
-    pub fn write(&self, interval: &Histograms, total: &Histograms, length: Duration) -> io::Result<()> {
+    /// The system's; the log then ends with its last whole interval.
+    pub fn append(&self, interval: &Histograms, length: Duration) -> io::Result<()> {
         let text = self.interval(interval, length)?;
         let mut file = File::options().create(true).append(true).open(&self.path)?;
         let before = file.metadata()?.len();
@@ -195,6 +195,14 @@ impl Log {
             let _ = file.set_len(before);
             return Err(error);
         }
+        Ok(())
+    }
+
+    /// Writes the `.hgrm` files of everything so far.
+    ///
+    /// # Errors
+    /// The system's; the old file is intact then.
+    pub fn summarise(&self, total: &Histograms) -> io::Result<()> {
         for (stage, name) in STAGES {
             write_whole(&self.dir.join(format!("{name}.hgrm")), hgrm(total.stage(stage)).as_bytes())?;
         }

@@ -136,6 +136,8 @@ impl<E: Estimator> Runner<E> {
         (recorder, events, shared): (Recorder, EventSender, Arc<Shared>),
     ) -> Result<Self, TransportError> {
         let link = Some(Link::open(settings, waiting.wait)?);
+        let mut cycle = cycle;
+        cycle.begin_at(now_ns());
         Ok(Self {
             cycle,
             limits,
@@ -203,8 +205,9 @@ impl<E: Estimator> Runner<E> {
             if fresh {
                 self.record(start_ns, finish_ns, &laps);
             }
-            self.report_changes(finish_ns - start_ns);
+            self.report_answer(finish_ns - start_ns);
         }
+        self.report_changes();
         self.shared.show(self.cycle.counters(), &self.link_counters);
         self.shared.heartbeat.fetch_add(1, Relaxed);
         self.recorder.exchange();
@@ -348,8 +351,8 @@ impl<E: Estimator> Runner<E> {
         }
     }
 
-    fn report_changes(&mut self, took_ns: i64) {
-        let counters = *self.cycle.counters();
+    /// What changed with this answer.
+    fn report_answer(&mut self, took_ns: i64) {
         let (id, sequence) = (self.pose.source_id, self.pose.source_sequence);
         if self.seen.source_id != Some(id) {
             self.seen.source_id = Some(id);
@@ -363,17 +366,23 @@ impl<E: Estimator> Runner<E> {
                 self.report(Event::Arm { arm, status, flags, sequence });
             }
         }
+        let late = self.cycle.counters().late;
+        if late != self.seen.late {
+            self.seen.late = late;
+            self.report(Event::Late { took_ns, sequence });
+        }
+    }
+
+    /// What changed whether or not there was an answer.
+    fn report_changes(&mut self) {
+        let counters = *self.cycle.counters();
         if counters.lost != self.seen.lost {
             self.seen.lost = counters.lost;
-            self.report(Event::Lost { total: counters.lost, sequence });
+            self.report(Event::Lost { total: counters.lost, sequence: self.pose.source_sequence });
         }
         if counters.refused != self.seen.refused {
             self.seen.refused = counters.refused;
             self.report(Event::Refused { total: counters.refused });
-        }
-        if counters.late != self.seen.late {
-            self.seen.late = counters.late;
-            self.report(Event::Late { took_ns, sequence });
         }
         let failures = self.link_counters.receive_failures + self.link_counters.send_failures;
         if failures != self.seen.link_failures {

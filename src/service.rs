@@ -55,7 +55,7 @@ pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
 }
 
 fn refuse(message: &str) -> ExitCode {
-    eprintln!("ravenposed: {message}");
+    say(message);
     ExitCode::from(2)
 }
 
@@ -131,10 +131,19 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::f
         missing.extend(realtime::lock_memory().err());
     }
     let (core, priority) = (config.core, config.priority);
-    let tried = std::thread::spawn(move || (core.map(realtime::pin), realtime::set_fifo(priority)));
-    if let Ok((pinned, fifo)) = tried.join() {
-        missing.extend(pinned.and_then(Result::err));
-        missing.extend(fifo.err());
+    let tried = std::thread::Builder::new()
+        .spawn(move || (core.map(realtime::pin), realtime::set_fifo(priority)))
+        .map_err(|cause| cause.to_string())
+        .and_then(|thread| thread.join().map_err(|_| "it failed".to_owned()));
+    match tried {
+        Ok((pinned, fifo)) => {
+            missing.extend(pinned.and_then(Result::err));
+            missing.extend(fifo.err());
+        }
+        Err(cause) => missing.push(Missing {
+            what: format!("no thread can be started ({cause})"),
+            remedy: "raise TasksMax= and LimitNPROC= of the unit, or LimitMEMLOCK=infinity".to_owned(),
+        }),
     }
     if !config.hold_cpu_dma_latency {
         return None;
@@ -190,7 +199,7 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
     }
     // From here on a panic ends the process at once: the controller then uses its own pose, and systemd starts us anew.
     std::panic::set_hook(Box::new(|panic| {
-        eprintln!("ravenposed: internal error: {panic}");
+        say(&format!("internal error: {panic}"));
         std::process::abort();
     }));
     let mut watch = Watch::new(config, shared, collector, events, prepared.names, standing == 0)?;

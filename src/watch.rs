@@ -7,8 +7,9 @@ use crate::say;
 use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
 use ravenpose_transport::{Message, Probe, Settings};
-use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, RavenState, flag, flag_names};
+use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag, flag_names};
 use sd_notify::NotifyState;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -25,6 +26,7 @@ const STUCK_TICKS: u32 = 4;
 const STUCK_TICKS_DEGRADED: u32 = 100;
 /// How often statistics are written and the link is probed.
 const SECOND: Duration = Duration::from_secs(1);
+const REMOVED: &str = "the shared files were removed under the service (RemoveIPC, a tmp cleaner?)";
 /// For this long after the link was opened anew it is opened again if newcomers still do not find it.
 const REOPEN_AGAIN: Duration = Duration::from_secs(20);
 /// How long the last files may take.
@@ -52,6 +54,8 @@ pub struct Watch {
     probe: Probe,
     /// States taken in when the link was last checked.
     accepted: u64,
+    /// Messages refused until then.
+    refused: u64,
     unreachable: u32,
     /// When the link was first opened anew after it had worked.
     reopened: Option<Instant>,
@@ -96,6 +100,7 @@ impl Watch {
             stuck_ticks: if realtime { STUCK_TICKS } else { STUCK_TICKS_DEGRADED },
             settings: config.transport.clone(),
             accepted: 0,
+            refused: 0,
             probe: Probe::open(&config.transport).map_err(|error| error.to_string())?,
             unreachable: 0,
             reopened: None,
@@ -116,7 +121,7 @@ impl Watch {
             self.lines.take(&event);
         }
         if self.lines.due() {
-            self.lines.print();
+            self.lines.print(&self.writer);
             self.collect(None);
             self.check_link();
             self.write_stats();
@@ -130,14 +135,18 @@ impl Watch {
     /// starts anew whether or not somebody outside watches.
     fn check_heartbeat(&mut self) {
         let heartbeat = self.shared.heartbeat.load(Relaxed);
-        if heartbeat != self.heartbeat || self.shared.reopen.load(Relaxed) {
+        if heartbeat != self.heartbeat {
             self.heartbeat = heartbeat;
             self.still = 0;
             notify(&[NotifyState::Watchdog]);
             return;
         }
         self.still += 1;
-        if self.still >= self.stuck_ticks {
+        // Opening a link may take a second; a hang in it ends like any other.
+        let reopening = self.shared.reopen.load(Relaxed);
+        if reopening && self.still < STUCK_TICKS_DEGRADED {
+            notify(&[NotifyState::Watchdog]);
+        } else if self.still >= self.stuck_ticks {
             say(&format!(
                 "the loop is stuck: no turn for {} ms; ending, so that it is started anew",
                 TICK.as_millis() * u128::from(self.still)
@@ -160,8 +169,11 @@ impl Watch {
     fn check_link(&mut self) {
         let (publishers, readers) = self.probe.count::<RavenState>();
         let (poses, _) = self.probe.count::<CorrectedPose>();
-        let accepted = self.shared.counters()[1];
+        let counters = self.shared.counters();
+        let (accepted, refused) = (counters[1], counters[7]);
         let flows = std::mem::replace(&mut self.accepted, accepted) != accepted;
+        // What is refused does arrive; the log says so by itself.
+        let refuses = std::mem::replace(&mut self.refused, refused) != refused;
         if readers > 0 && poses > 0 {
             self.unreachable = 0;
         } else {
@@ -177,24 +189,24 @@ impl Watch {
         if self.unreachable == 2 && flows && !settling {
             // What works is left alone: it would only be interrupted.
             say(
-                "the shared files were removed under the service (RemoveIPC, a tmp cleaner?); the running link goes on, newcomers cannot join until the service is restarted",
+                "the shared files were removed under the service (RemoveIPC, a tmp cleaner?); the running link goes on, newcomers cannot join until the control process is restarted",
             );
         } else if self.unreachable >= 2 && (!flows || settling) && !self.shared.reopen.load(Relaxed) {
             self.unreachable = 0;
             if !settling {
                 self.reopened = Some(Instant::now());
             }
-            say("the shared files were removed under the service (RemoveIPC, a tmp cleaner?); opening the link anew");
+            self.writer.line(format!("{REMOVED}; opening the link anew"));
             self.shared.reopen.store(true, Relaxed);
         }
         let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
         let never = accepted == 0;
-        if publishers == 0 || !(stale || never) {
+        if publishers == 0 || refuses || !(stale || never) {
             self.silent_since = None;
             self.silence_explained = false;
         } else if self.silent_since.get_or_insert_with(Instant::now).elapsed() > 2 * SECOND && !self.silence_explained {
             self.silence_explained = true;
-            say(&format!(
+            self.writer.line(format!(
                 "a publisher of {} is connected but its states do not arrive; it is stopped, or runs as another user: all parties must run as the same user",
                 RavenState::SERVICE
             ));
@@ -220,7 +232,7 @@ impl Watch {
         while let Some(event) = self.events.dequeue() {
             self.lines.take(&event);
         }
-        self.lines.print();
+        self.lines.print(&self.writer);
         self.collect(last);
         self.write_log();
         self.write_stats();
@@ -246,6 +258,8 @@ pub fn notify(states: &[NotifyState]) {
 struct Lines {
     last: [Option<Event>; Event::KINDS],
     counts: [u64; Event::KINDS],
+    /// Every reason that was given since the last line.
+    reasons: [u32; Event::KINDS],
     printed: Option<Instant>,
 }
 
@@ -253,20 +267,30 @@ impl Lines {
     fn take(&mut self, event: &Event) {
         self.last[event.kind()] = Some(*event);
         self.counts[event.kind()] += 1;
+        if let Event::Arm { flags, .. } = event {
+            self.reasons[event.kind()] |= flags & FALLBACK_REASONS;
+        }
     }
 
     fn due(&self) -> bool {
         self.printed.is_none_or(|printed| printed.elapsed() >= SECOND)
     }
 
-    fn print(&mut self) {
+    fn print(&mut self, writer: &Writer) {
         self.printed = Some(Instant::now());
-        for (last, count) in self.last.iter_mut().zip(&mut self.counts) {
-            if let Some(event) = last.take() {
-                let repeated = if *count > 1 { format!(" ({count} such events in the last second)") } else { String::new() };
-                say(&format!("{}{repeated}", describe(&event)));
+        for kind in 0..Event::KINDS {
+            let (count, reasons) = (std::mem::take(&mut self.counts[kind]), std::mem::take(&mut self.reasons[kind]));
+            let Some(event) = self.last[kind].take() else { continue };
+            let mut line = describe(&event);
+            if count > 1 {
+                let _ = write!(line, " ({count} such events in the last second");
+                let names: Vec<_> = flag_names(reasons).collect();
+                if !names.is_empty() {
+                    let _ = write!(line, ", reasons among them: {}", names.join(" "));
+                }
+                line.push(')');
             }
-            *count = 0;
+            writer.line(line);
         }
     }
 }

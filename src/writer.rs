@@ -1,4 +1,5 @@
-//! The thread that touches the disk, and nothing else does: a disk that hangs holds up neither the loop nor the watchdog.
+//! The thread that touches the disk and the log, and nothing else does once the service runs: a disk or a pipe that hangs holds up
+//! neither the loop nor the watchdog.
 
 use crate::histogram::Histograms;
 use crate::report::{self, Log};
@@ -10,12 +11,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// What may wait for the disk; what does not fit is offered again a second later.
-const WAITING: usize = 2;
+const WAITING: usize = 32;
 
 /// Something to write.
 enum Job {
     Stats(Vec<u8>),
     Log { interval: Box<Histograms>, total: Box<Histograms>, length: Duration },
+    Line(String),
 }
 
 /// The near end: never blocks.
@@ -47,6 +49,11 @@ impl Writer {
         self.offer(Job::Log { interval: Box::new(interval.clone()), total: Box::new(total.clone()), length })
     }
 
+    /// Offers a line for the log; a log that hangs holds nobody up, and what does not fit is dropped.
+    pub fn line(&self, text: String) {
+        let _ = self.offer(Job::Line(text));
+    }
+
     fn offer(&self, job: Job) -> bool {
         self.jobs
             .as_ref()
@@ -66,7 +73,7 @@ impl Writer {
 }
 
 fn write_all(jobs: &Receiver<Job>, stats_path: &Path, log: Option<&Log>) {
-    let mut complained = [false; 2];
+    let mut complained = [false; 3];
     // What could not be written goes out with the next interval.
     let mut unwritten: Option<(Histograms, Duration)> = None;
     for job in jobs {
@@ -77,12 +84,14 @@ fn write_all(jobs: &Receiver<Job>, stats_path: &Path, log: Option<&Log>) {
                 let (mut whole, mut long) = unwritten.take().unwrap_or_else(|| (Histograms::new(), Duration::ZERO));
                 whole.add(&interval);
                 long += length;
-                let written = log.write(&whole, &total, long);
-                if written.is_err() {
+                let appended = log.append(&whole, long);
+                if appended.is_err() {
                     unwritten = Some((whole, long));
                 }
-                complain_once(&mut complained[1], "histograms", written);
+                complain_once(&mut complained[1], "the histogram log", appended);
+                complain_once(&mut complained[2], "histograms", log.summarise(&total));
             }
+            Job::Line(text) => say(&text),
         }
     }
 }

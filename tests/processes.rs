@@ -1,6 +1,6 @@
 //! Real processes, real shared memory, real signals: killed and restarted in any order, stopped at any phase, started twice.
 //!
-//! `RAVENPOSE_KILLS` sets the number of kills (50; `make faults` does 10,000).
+//! `RAVENPOSE_KILLS` sets the number of kills of each kind of process (50; `make faults` does 10,000).
 
 mod common;
 #[path = "common/service.rs"]
@@ -11,6 +11,13 @@ use ravenpose_wire::{ArmStatus, CorrectedPose, flag};
 use service::{Process, World, publish_forever, role, whole};
 use std::io::{BufRead, BufReader};
 use std::time::{Duration, Instant};
+
+/// One at a time: each brings several processes, and there are two cores.
+static MACHINE: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
+fn machine() -> std::sync::MutexGuard<'static, ()> {
+    MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
 
 const VALID: u32 = ArmStatus::Valid as u32;
 const POSE_AGE_MAX_NS: i64 = 5_000_000;
@@ -31,7 +38,7 @@ fn client() -> ! {
             if !whole(&pose) {
                 println!("WRONG fields: {pose:?}");
             }
-            if pose.arm[0].status == VALID && pose.publish_time_ns - pose.source_time_ns > POSE_AGE_MAX_NS + 1_000_000 {
+            if pose.arm[0].status == VALID && pose.publish_time_ns - pose.source_time_ns > POSE_AGE_MAX_NS {
                 println!("WRONG: a stale state was published as valid: {pose:?}");
             }
             if age < POSE_AGE_MAX_NS && !said {
@@ -85,10 +92,7 @@ impl Monitor {
             assert!(whole(&pose), "torn or mixed: {pose:?}");
             for arm in &pose.arm {
                 if arm.status == VALID {
-                    assert!(
-                        pose.publish_time_ns - pose.source_time_ns < POSE_AGE_MAX_NS + 1_000_000,
-                        "stale presented as fresh: {pose:?}"
-                    );
+                    assert!(pose.publish_time_ns - pose.source_time_ns < POSE_AGE_MAX_NS, "stale presented as fresh: {pose:?}");
                 }
             }
             let now = now_ns();
@@ -110,13 +114,14 @@ impl Monitor {
 }
 
 #[test]
-fn fifty_random_kills_of_any_process_are_survived() {
+fn fifty_kills_of_each_process_in_random_order_are_survived() {
     match role().as_deref() {
         Some("publisher") => publish_forever(),
         Some("client") => client(),
         _ => {}
     }
-    let test = "fifty_random_kills_of_any_process_are_survived";
+    let test = "fifty_kills_of_each_process_in_random_order_are_survived";
+    let _machine = machine();
     let world = World::new("kill");
     let config = world.config(CONFIG);
     let mut service = world.start(&config, &[]);
@@ -130,8 +135,14 @@ fn fifty_random_kills_of_any_process_are_survived() {
     println!("seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
     let mut rng = common::Rng(seed);
     let (mut slowest_fresh, mut slowest_valid, mut most_files) = (0, 0, baseline);
-    for kill in 0..kills() {
-        let victim = rng.below(3);
+    let mut left = [kills(); 3];
+    for kill in 0..3 * kills() {
+        // Any order, the same number of each.
+        let mut victim = rng.below(3) as usize;
+        while left[victim] == 0 {
+            victim = (victim + 1) % 3;
+        }
+        left[victim] -= 1;
         let pause = Duration::from_millis(rng.below(50));
         monitor.look();
         match victim {
@@ -171,7 +182,7 @@ fn fifty_random_kills_of_any_process_are_survived() {
         monitor.watch_ms(5 + rng.below(40) as i64);
     }
     println!(
-        "{} kills: slowest reconnect {} ms, slowest return to valid {} ms (with the start of the process), shared files {baseline} at first, {most_files} at most",
+        "{} kills of each process: slowest reconnect {} ms, slowest return to valid {} ms (with the start of the process), shared files {baseline} at first, {most_files} at most",
         kills(),
         slowest_fresh / 1_000_000,
         slowest_valid / 1_000_000
@@ -195,7 +206,9 @@ fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_not
         publish_forever();
     }
     let test = "every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing";
+    let _machine = machine();
     let mut rng = common::Rng(42);
+    let mut quickest = Duration::MAX;
     for signal in [libc::SIGTERM, libc::SIGINT, libc::SIGHUP] {
         let world = World::new(&format!("stop{signal}"));
         let config = world.config(CONFIG);
@@ -216,7 +229,9 @@ fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_not
         let asked = Instant::now();
         service.signal(signal);
         let status = service.end();
-        println!("signal {signal}: ended after {} ms", asked.elapsed().as_millis());
+        let took = asked.elapsed();
+        println!("signal {signal}: ended after {} ms", took.as_millis());
+        quickest = quickest.min(took);
         assert_eq!(status.code(), Some(0));
         while let Some(pose) = reader.next().expect("pose") {
             last = Some(pose);
@@ -237,10 +252,47 @@ fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_not
             .collect();
         assert!(left.is_empty(), "left in shared memory: {left:?}");
     }
+    // The machine may hold one of them up; not all.
+    assert!(quickest <= Duration::from_millis(200), "{quickest:?}");
+}
+
+#[test]
+fn readers_that_never_read_cost_the_loop_nothing() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let _machine = machine();
+    let world = World::new("idle");
+    let config = world.config(CONFIG);
+    let _service = world.start(&config, &[]);
+    // All places but one, by clients that connect and then sleep for ever; the last one reads.
+    let idle: Vec<Reader<CorrectedPose>> = (1..128).map(|_| Reader::open(&world.settings, 64).expect("a place")).collect();
+    let reader = world.poses();
+    assert!(Reader::<CorrectedPose>::open(&world.settings, 1).is_err_and(|error| error.to_string().contains("no free place")));
+    let _publisher = world.role("readers_that_never_read_cost_the_loop_nothing", "publisher");
+    let begun = Instant::now();
+    let (mut poses, mut last) = (0_u64, 0);
+    while begun.elapsed() < Duration::from_secs(4) {
+        while let Some(pose) = reader.next().expect("pose") {
+            poses += 1;
+            assert!(pose.sequence > last, "in order");
+            last = pose.sequence;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(poses > 2_000, "{poses}\n{}", world.log());
+    // The idle ones hold the newest 64, the oldest were overwritten.
+    let kept = idle[0].drain(|_| {}).expect("queue");
+    assert_eq!(kept, 64);
+    let stats = std::fs::read(world.dir.0.join("run/stats.json")).expect("statistics");
+    let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
+    let failures = stats.counters.iter().find(|counter| counter.name == "send_failures").expect("counter");
+    assert_eq!(failures.value, 0);
 }
 
 #[test]
 fn a_second_service_is_refused_and_the_first_lives_on() {
+    let _machine = machine();
     let world = World::new("twice");
     let config = world.config(CONFIG);
     let mut first = world.start(&config, &[]);
@@ -257,6 +309,7 @@ fn a_service_whose_files_were_removed_opens_its_link_anew() {
         publish_forever();
     }
     let test = "a_service_whose_files_were_removed_opens_its_link_anew";
+    let _machine = machine();
     let world = World::new("removed");
     let config = world.config(CONFIG);
     let _service = world.start(&config, &[]);
@@ -298,6 +351,7 @@ fn a_working_link_is_left_alone_when_its_files_are_removed() {
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
+    let _machine = machine();
     let world = World::new("robbed");
     let config = world.config(CONFIG);
     let _service = world.start(&config, &[]);
@@ -309,17 +363,16 @@ fn a_working_link_is_left_alone_when_its_files_are_removed() {
     }
     common::remove_shared_memory(&world.settings.prefix);
     let begun = Instant::now();
-    let (mut poses, mut last) = (0, None);
+    let (mut poses, mut valid) = (0, 0);
     while begun.elapsed() < Duration::from_secs(5) {
         while let Some(pose) = reader.next().expect("pose") {
             poses += 1;
-            last = Some(pose);
+            valid += u64::from(pose.arm[0].status == VALID);
         }
         std::thread::sleep(Duration::from_millis(5));
     }
     println!("{poses} poses in 5 s after the files were removed");
-    assert!(poses > 4_000, "{}", world.log());
-    assert_eq!(last.expect("a pose").arm[0].status, VALID);
+    assert!(poses > 2_500 && valid > poses / 2, "{poses} {valid}\n{}", world.log());
     let words = world.log();
     assert_eq!(words.matches("newcomers cannot join").count(), 1, "{words}");
     assert!(!words.contains("opening the link anew"), "{words}");

@@ -31,6 +31,23 @@ fn without_rights(command: &mut Command) -> &mut Command {
 }
 
 /// Only root can become somebody else.
+/// The configuration with the copies of [`world`].
+fn config(world: &World, more: &str) -> std::path::PathBuf {
+    let path = world.config(more);
+    let text = std::fs::read_to_string(&path).expect("configuration");
+    let model = common::untrained();
+    let copy = world.dir.0.join(model.file_name().expect("a file"));
+    std::fs::write(&path, text.replace(&model.display().to_string(), &copy.display().to_string())).expect("configuration");
+    path
+}
+
+/// The copy of the service in [`world`].
+fn service_of(world: &World, config: &std::path::Path) -> Command {
+    let mut command = world.command(&world.dir.0.join("ravenposed").display().to_string());
+    command.arg("--config").arg(config).stdin(std::process::Stdio::null()).stdout(std::process::Stdio::null());
+    command
+}
+
 fn may_change_user() -> bool {
     // SAFETY: no arguments, no memory.
     let root = unsafe { libc::geteuid() } == 0;
@@ -42,6 +59,16 @@ fn may_change_user() -> bool {
 
 fn world(name: &str) -> World {
     let world = World::new(name);
+    // The checkout may lie where nobody else can look.
+    let model = common::untrained();
+    for from in [
+        env!("CARGO_BIN_EXE_ravenposed").into(),
+        std::env::current_exe().expect("this program"),
+        model.clone(),
+        model.with_extension("onnx.sha256"),
+    ] {
+        std::fs::copy(&from, world.dir.0.join(from.file_name().expect("a file"))).expect("copied");
+    }
     chown(&world.dir.0, Some(NOBODY), Some(NOBODY)).expect("root may give a directory away");
     world
 }
@@ -58,8 +85,8 @@ fn each_missing_right_is_refused_with_one_line_and_its_remedy() {
         ("lock_memory = false\nwait = \"spin\"", "real-time throttling is on", "sched_rt_runtime_us=-1"),
     ] {
         let world = world("rights");
-        let config = world.config(&format!("allow_untrained = true\n[loop]\n{table}"));
-        let output = without_rights(&mut world.service(&config)).output().expect("service");
+        let config = config(&world, &format!("allow_untrained = true\n[loop]\n{table}"));
+        let output = without_rights(&mut service_of(&world, &config)).output().expect("service");
         let text = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{text}");
         let last = text.lines().last().expect("a line");
@@ -82,10 +109,11 @@ fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
         return;
     }
     let world = world("degraded");
-    let config = world.config("allow_untrained = true\nallow_degraded = true");
+    let config = config(&world, "allow_untrained = true\nallow_degraded = true");
     let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
-    let mut service = service::Process(without_rights(&mut world.service(&config)).stderr(log).spawn().expect("service"));
+    let mut service = service::Process(without_rights(&mut service_of(&world, &config)).stderr(log).spawn().expect("service"));
     let this = std::env::current_exe().expect("this program");
+    let this = world.dir.0.join(this.file_name().expect("a file"));
     let mut publisher = world.command(&this.display().to_string());
     let publisher = without_rights(&mut publisher)
         .args(["with_allow_degraded_it_goes_on_and_every_message_says_so", "--exact", "--nocapture"])

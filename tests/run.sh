@@ -4,7 +4,8 @@
 set -u
 cd "$(dirname "$0")/.."
 stage=$1
-export RAVENPOSE_PYTHON=$2
+python=$2
+if "$python" -c 'import iceoryx2' 2>/dev/null; then export RAVENPOSE_PYTHON=$python; fi
 log=$(mktemp "${TMPDIR:-/tmp}/ravenpose-test.XXXXXX")
 trap 'rm -f "$log"' EXIT
 status=0
@@ -14,7 +15,7 @@ run() { "$@" 2>&1 | tee -a "$log"; [ "${PIPESTATUS[0]}" -eq 0 ] || status=1; }
 run cargo test --release --locked --workspace --no-fail-fast -- --show-output
 ( cd offline && cargo test --release --locked --workspace --no-fail-fast -- --show-output ) 2>&1 | tee -a "$log"
 [ "${PIPESTATUS[0]}" -eq 0 ] || status=1
-run tests/packaging/run.sh "$stage" "$(dirname "$RAVENPOSE_PYTHON")"
+run tests/packaging/run.sh "$stage" "$(dirname "$python")"
 
 echo
 grep -ho 'skipped[: ].*' "$log" | sort | uniq -c | sed 's/^/  /'

@@ -14,13 +14,16 @@ export RAVENPOSE_ROOT="$work/iceoryx2/"
 service= client= standin=
 
 clean() {
-  trap - EXIT INT TERM HUP
-  for pid in $standin $client $service; do kill -TERM "$pid" 2>/dev/null; done
-  for pid in $standin $client $service; do
-    for _ in 1 2 3 4 5 6 7 8 9 10; do kill -0 "$pid" 2>/dev/null || break; sleep 0.05; done
-    kill -KILL "$pid" 2>/dev/null
-    wait "$pid" 2>/dev/null
-  done
+  # A second Ctrl-C must not stop the cleaning.
+  trap - EXIT
+  trap '' INT TERM HUP
+  local pids="$standin $client $service"
+  # shellcheck disable=SC2086
+  [ -z "${pids// /}" ] || kill -TERM $pids 2>/dev/null
+  for _ in $(seq 1 40); do [ -n "$(jobs -rp)" ] || break; sleep 0.05; done
+  # shellcheck disable=SC2046
+  [ -z "$(jobs -rp)" ] || kill -KILL $(jobs -rp) 2>/dev/null
+  wait 2>/dev/null
   rm -rf "$work"
   rm -f /dev/shm/"$RAVENPOSE_PREFIX"*
 }

@@ -291,7 +291,7 @@ typedef struct ravenpose_arm_pose {
    */
   uint64_t model_id;
   /*
-   Goes up by one whenever the correction drops to zero at once (an announced step).
+   Goes up by one whenever the correction drops to zero at once (an announced step); a restarted service begins with another one.
    */
   uint32_t reset_count;
   /*
@@ -341,7 +341,7 @@ typedef struct ravenpose_pose {
    */
   uint64_t guard_head;
   /*
-   Counts up by one per published message, starting at 1 when the service starts.
+   Counts up by one per published message; a restarted service goes on from a higher number.
    */
   uint64_t sequence;
   /*

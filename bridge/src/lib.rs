@@ -1,7 +1,8 @@
 //! The C interface: publish `raven_state`, read the corrected pose. `include/ravenpose.h` is generated from this file.
 //!
 //! The publisher lives inside the robot's control process. After `open`, `loan`, `send`, `publish`, `take` and `next` allocate nothing,
-//! lock nothing and make no system call, but for the one call in which a new peer appears; none of them ever blocks or panics. A
+//! lock nothing and make no system call, but for the one call in which a new peer appears and, while a service with `wait = "event"`
+//! listens, one call per state to wake it; none of them ever blocks or panics. A
 //! handle may be used by any thread, but by one at a time.
 //!
 //! This crate contains `unsafe`: every function takes pointers from C. They may be null (an error code); otherwise they must be what
@@ -46,10 +47,7 @@ pub struct Options {
 }
 
 fn settings(options: &Options) -> Result<Settings, Code> {
-    if options.abi_version != RAVENPOSE_ABI_VERSION
-        || options.state_size as usize != size_of::<RavenState>()
-        || options.pose_size as usize != size_of::<CorrectedPose>()
-    {
+    if options.state_size as usize != size_of::<RavenState>() || options.pose_size as usize != size_of::<CorrectedPose>() {
         return Err(Code::Version);
     }
     let mut settings = Settings::from_env();
@@ -86,14 +84,26 @@ unsafe fn open<T>(
     if options.is_null() || out.is_null() {
         return Code::Null as i32;
     }
-    // SAFETY: both were checked for null; the caller gives valid pointers otherwise.
-    let options = unsafe {
+    // SAFETY: both were checked for null; the caller gives valid pointers otherwise. Only the first field is read before the version
+    // is known to be ours: options of another version may be shorter.
+    let abi_version = unsafe {
         *out = std::ptr::null_mut();
-        *options
+        (&raw const (*options).abi_version).read()
     };
+    if abi_version != RAVENPOSE_ABI_VERSION {
+        let text = format!(
+            "version mismatch: the program was compiled for ABI {abi_version}, this library has ABI {RAVENPOSE_ABI_VERSION}; compile it again"
+        );
+        // SAFETY: the caller's buffer.
+        unsafe { tell(&text, message, message_size) };
+        return Code::Version as i32;
+    }
+    // SAFETY: options of our own version.
+    let options = unsafe { *options };
     let made = guarded(|| match settings(&options) {
         Ok(settings) => make(&settings, &options),
-        Err(code) => Err((code, version_text(&options))),
+        Err(Code::Version) => Err((Code::Version, version_text(&options))),
+        Err(code) => Err((code, code.text().to_owned())),
     });
     match made {
         Ok(Ok(handle)) => {

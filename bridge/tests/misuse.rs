@@ -1,24 +1,36 @@
 //! Wrong use of the C interface gives a code, never undefined behaviour.
 
+#[path = "../../tests/common/mod.rs"]
+mod common;
+
 use ravenpose_bridge::*;
 use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
 use std::ffi::{CStr, CString, c_char};
 use std::ptr::{null, null_mut};
 
-fn options(prefix: &CString) -> Options {
+fn options(prefix: &Prefix) -> Options {
     Options {
         abi_version: RAVENPOSE_ABI_VERSION,
         state_size: size_of::<RavenState>() as u32,
         pose_size: size_of::<CorrectedPose>() as u32,
         queue_depth: 0,
         reserved: [0; 2],
-        prefix: prefix.as_ptr(),
+        prefix: prefix.0.as_ptr(),
         root: null(),
     }
 }
 
-fn prefix(name: &str) -> CString {
-    CString::new(format!("rpmis{name}{}_", std::process::id())).expect("no NUL")
+/// A prefix of its own, whose files are gone when it is dropped.
+struct Prefix(CString);
+
+impl Drop for Prefix {
+    fn drop(&mut self) {
+        common::remove_shared_memory(self.0.to_str().expect("UTF-8"));
+    }
+}
+
+fn prefix(name: &str) -> Prefix {
+    Prefix(CString::new(format!("rpmis{name}{}_", std::process::id())).expect("no NUL"))
 }
 
 #[test]
@@ -73,7 +85,7 @@ fn another_version_is_refused_with_both_versions_in_the_message() {
             assert!(publisher.is_null());
             CStr::from_ptr(message.as_ptr()).to_str().expect("UTF-8")
         };
-        assert!(text.contains("version mismatch") && text.contains("ABI 1"), "{text}");
+        assert!(text.contains("version mismatch") && text.contains("has ABI 1"), "{text}");
         assert!(!text.contains('\n'));
     }
 }
@@ -121,7 +133,7 @@ fn one_publisher_only_and_its_place_is_free_again_after_close() {
 
 #[test]
 fn a_prefix_that_is_no_file_name_is_refused() {
-    let name = CString::new("../evil").expect("no NUL");
+    let name = Prefix(CString::new("../evil").expect("no NUL"));
     let mut publisher = null_mut();
     // SAFETY: valid pointers.
     assert_eq!(unsafe { ravenpose_publisher_open(&options(&name), &raw mut publisher, null_mut(), 0) }, Code::Argument as i32);

@@ -171,7 +171,7 @@ pub fn whole(pose: &CorrectedPose) -> bool {
         })
 }
 
-/// Publishes telling states at 1 kHz until killed.
+/// Publishes telling states at 1 kHz until killed, each written slowly in two halves, so that a kill often meets a half-written one.
 pub fn publish_forever() -> ! {
     let settings = Settings::from_env();
     let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
@@ -183,7 +183,22 @@ pub fn publish_forever() -> ! {
         let mut state = telling(sequence, now_ns());
         state.source_id = source;
         state.seal(sequence);
-        let _ = writer.send(&state);
+        if let Ok(mut loan) = writer.loan() {
+            let half = size_of::<RavenState>() / 2;
+            let to: *mut u8 = loan.as_mut_ptr().cast();
+            let from: *const u8 = std::ptr::from_ref(&state).cast();
+            // SAFETY: both are states; the two halves are the whole.
+            unsafe { std::ptr::copy_nonoverlapping(from, to, half) };
+            let until = now_ns() + 200_000;
+            while now_ns() < until {
+                std::hint::spin_loop();
+            }
+            // SAFETY: as above; now everything is written.
+            let _ = unsafe {
+                std::ptr::copy_nonoverlapping(from.add(half), to.add(half), half);
+                loan.send_written()
+            };
+        }
         next = (next + 1_000_000).max(now_ns() - 1_000_000);
         sleep_until_ns(next);
     }

@@ -28,6 +28,9 @@ struct Truth {
     time_ns: i64,
     /// Per arm: may this state be corrected at all?
     good: [bool; 2],
+    /// Which freeze of the encoders, counted from 1, and for how many states; 0 where they move.
+    freeze: u64,
+    held: u64,
 }
 
 struct World {
@@ -42,6 +45,8 @@ struct World {
     /// Remaining cycles of each standing fault.
     silent: u64,
     frozen: u64,
+    held: u64,
+    freezes: u64,
     frozen_at: [i32; 16],
     slow: u64,
     offered: u64,
@@ -61,6 +66,8 @@ impl World {
             truth: HashMap::new(),
             silent: 0,
             frozen: 0,
+            held: 0,
+            freezes: 0,
             frozen_at: [0; 16],
             slow: 0,
             offered: 0,
@@ -90,13 +97,25 @@ impl World {
         if self.frozen > 0 {
             self.frozen -= 1;
             message.enc_vals = self.frozen_at;
+            self.held += 1;
+        } else {
+            self.held = 0;
         }
         message.hdr_stamp_sec = self.rng.next() as u32;
         if self.stormy() && self.rng.chance(40) {
             self.spoil(&mut message, &mut good);
         }
         message.seal(self.sequence);
-        self.truth.insert((self.source, self.sequence, self.now), Truth { pos: message.pos, time_ns: self.now, good });
+        self.truth.insert(
+            (self.source, self.sequence, self.now),
+            Truth {
+                pos: message.pos,
+                time_ns: self.now,
+                good,
+                freeze: if self.held > 0 { self.freezes } else { 0 },
+                held: self.held,
+            },
+        );
         self.send(message);
     }
 
@@ -104,8 +123,9 @@ impl World {
         if self.rng.chance(300) {
             self.silent = 1 + self.rng.below(40);
         }
-        if self.rng.chance(500) {
-            self.frozen = 25;
+        if self.rng.chance(500) && self.frozen == 0 && self.held == 0 {
+            self.frozen = 40;
+            self.freezes += 1;
             self.frozen_at = state(1, 1, self.step, 0).enc_vals;
         }
         if self.rng.chance(300) {
@@ -195,6 +215,8 @@ struct Checker {
     sequence: u64,
     newest: HashMap<u64, (u64, i64)>,
     good_in_row: [u64; 2],
+    /// `held` of the first state of a freeze that got through.
+    first_held: Option<(u64, u64)>,
     valid: u64,
     fallbacks: u64,
     reasons: u32,
@@ -218,6 +240,14 @@ impl Checker {
             assert!(pose.source_sequence >= *sequence || pose.source_time_ns > *time, "source sequence fell");
         }
         self.newest.insert(pose.source_id, (pose.source_sequence, pose.source_time_ns));
+        // Every motor moved fast before: 20 cycles after the first held state that got through nothing may be corrected.
+        let same = self.first_held.filter(|(freeze, _)| *freeze == known.freeze);
+        self.first_held = (known.freeze > 0).then(|| same.unwrap_or((known.freeze, known.held)));
+        let mut known = *known;
+        if self.first_held.is_some_and(|(_, first)| known.held - first >= 20) {
+            known.good = [false; 2];
+        }
+        let known = &known;
         for index in 0..2 {
             self.check_arm(index, pose, known, repeats, now, limits);
         }
@@ -240,7 +270,8 @@ impl Checker {
             assert_eq!(arm.flags & FALLBACK_REASONS, 0);
             assert!(!repeats, "a repeated state is never valid");
             assert!(known.good[index], "a bad state is never corrected");
-            assert!(now - pose.source_time_ns < limits.stale_ns, "a stale state is never corrected");
+            let age = pose.publish_time_ns.max(now) - pose.source_time_ns;
+            assert!(age < limits.stale_ns, "a state that is stale when the answer goes out is never corrected: {age}");
             assert!(self.good_in_row[index] >= u64::from(limits.good_cycles), "only after enough good cycles");
         } else {
             self.fallbacks += 1;
@@ -293,6 +324,7 @@ fn run(seed: u64, count: u64) -> Checker {
         sequence: start.published,
         newest: HashMap::new(),
         good_in_row: [0; 2],
+        first_held: None,
         valid: 0,
         fallbacks: 0,
         reasons: 0,
@@ -316,6 +348,9 @@ fn run(seed: u64, count: u64) -> Checker {
             if world.slow > 0 {
                 world.slow -= 1;
                 took = 500_001 + world.rng.below(400_000) as i64;
+                if world.rng.chance(10) {
+                    took = world.rng.below(50_000_000) as i64;
+                }
             }
             cycle.finish(wake + took, false, &mut pose);
             checker.check(&pose, &world.truth, wake, &limits);

@@ -64,6 +64,28 @@ fn f05_an_old_message_is_not_corrected() {
 }
 
 #[test]
+fn f05_a_state_that_becomes_stale_inside_the_cycle_is_not_corrected() {
+    let mut bench = Bench::new();
+    bench.settle();
+    bench.took = 5 * MS;
+    let pose = bench.good();
+    assert_fallback(&pose, flag::INPUT_STALE);
+    assert!(pose.arm.iter().all(|arm| arm.flags & (flag::LATE | flag::RESET) == flag::LATE | flag::RESET));
+}
+
+#[test]
+fn f02_a_restarted_service_is_an_announced_step_with_higher_numbers() {
+    let (mut before, mut after) = (Bench::new(), Bench::new());
+    before.cycle.begin_at(before.now);
+    let old = before.settle();
+    after.now = before.now;
+    after.cycle.begin_at(after.now);
+    let new = after.good();
+    assert!(new.sequence > old.sequence);
+    assert!((0..2).all(|arm| new.arm[arm].reset_count != old.arm[arm].reset_count));
+}
+
+#[test]
 fn f06_duplicates_publish_nothing() {
     let mut bench = Bench::new();
     bench.settle();
@@ -320,6 +342,25 @@ fn f15_frozen_encoders_end_the_correction_within_20_ms() {
         }
         assert!(cycle < 20, "not found in 20 ms");
     }
+}
+
+#[test]
+fn f15_and_f08_frozen_encoders_are_found_although_states_are_lost() {
+    let mut bench = Bench::new();
+    bench.settle();
+    let frozen = bench.cycle.newest().expect("settled").enc_vals;
+    for cycle in 1..=40 {
+        let mut state = bench.next_state();
+        if cycle % 3 == 0 {
+            continue;
+        }
+        state.enc_vals = frozen;
+        if bench.run(&[state]).expect("answered").arm[0].status == FALLBACK {
+            assert!(cycle <= 30, "{cycle}");
+            return;
+        }
+    }
+    panic!("never found");
 }
 
 #[test]

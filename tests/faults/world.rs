@@ -34,8 +34,8 @@ pub(crate) fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> Rave
         state.jpos[at + 2] = 22.9;
         state.jpos_d[at..at + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
         for slot in [0, 1, 2, 4, 5, 6, 7] {
-            // Steadily moving encoders: one count per cycle at least.
-            state.enc_vals[at + slot] = (step as i32 % 100_000) * (1 + slot as i32);
+            // Encoders that move fast: 40 counts per cycle at least, so that a stop shows in spite of a few lost states.
+            state.enc_vals[at + slot] = (step as i32 % 20_000) * (40 + slot as i32);
             state.mpos[at + slot] = state.enc_vals[at + slot] as f32 * 0.09;
         }
     }

@@ -17,7 +17,7 @@ pub struct ArmPose {
     pub flags: u32,
     /// First eight bytes of the model file's SHA-256, big-endian (prints as the hash begins); 0 without a model.
     pub model_id: u64,
-    /// Goes up by one whenever the correction drops to zero at once (an announced step).
+    /// Goes up by one whenever the correction drops to zero at once (an announced step); a restarted service begins with another one.
     pub reset_count: u32,
     /// Distance from the trained domain, 1 = its edge; -1 where it was not computed.
     pub domain_score: f32,
@@ -63,7 +63,7 @@ pub struct CorrectedPose {
     pub size: u32,
     /// Equals `sequence`; written first.
     pub guard_head: u64,
-    /// Counts up by one per published message, starting at 1 when the service starts.
+    /// Counts up by one per published message; a restarted service goes on from a higher number.
     pub sequence: u64,
     /// `source_id` of the state that this answers.
     pub source_id: u64,
