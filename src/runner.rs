@@ -225,13 +225,13 @@ impl<E: Estimator> Runner<E> {
                 Waited::Polled
             }
             Wait::Sleep if self.misses > MISSES_MAX => {
-                let wake = self.phase.expected_ns(newest, now).min(stale);
+                let wake = self.phase.expected_ns(now).min(stale);
                 sleep_until_ns(wake);
                 self.recorder.record(Stage::Wakeup, now_ns() - wake);
                 Waited::Slept
             }
             Wait::Sleep => {
-                let plan = self.phase.plan(newest, now);
+                let plan = self.phase.plan(now);
                 let wake = plan.wake_ns.min(stale);
                 sleep_until_ns(wake);
                 if wake > now {
@@ -244,7 +244,7 @@ impl<E: Estimator> Runner<E> {
                 Waited::Polled
             }
             Wait::Event => {
-                let deadline = (self.phase.expected_ns(newest, now) + period / 4).min(stale);
+                let deadline = (self.phase.expected_ns(now) + period / 4).min(stale);
                 let mut left = deadline - now;
                 while left > 0 && !self.waiting_state() && !self.shared.stop.load(Relaxed) {
                     if let Some(listener) = self.listener() {
@@ -268,6 +268,7 @@ impl<E: Estimator> Runner<E> {
             return;
         }
         let found = match (waited, self.misses) {
+            (Waited::Polled, 1..=MISSES_MAX) => Found::PollingAfterMiss,
             (Waited::Polled, _) => Found::Polling,
             (Waited::Slept, 0) => Found::Waiting,
             (Waited::Slept, 1..=MISSES_MAX) => Found::AfterMiss,
@@ -275,9 +276,7 @@ impl<E: Estimator> Runner<E> {
             (Waited::Slept, _) => Found::Waiting,
         };
         self.misses = 0;
-        if let Some(state) = self.cycle.newest() {
-            self.phase.learn(found, state.source_time_ns, now_ns);
-        }
+        self.phase.learn(found, now_ns);
     }
 
     fn poll_until(&mut self, deadline_ns: i64) {

@@ -71,12 +71,13 @@ fn state(sequence: u64) -> RavenState {
     state
 }
 
-/// Every tenth thousand turn has a fault, so that fallback paths are proven too.
+/// One arm, so that a million turns take about a minute. Every tenth thousand turn has a fault, so that fallback paths are proven too.
 fn faulty(sequence: u64) -> RavenState {
     let mut state = state(sequence);
+    state.arms = 1;
     match sequence % 10_000 {
         0 => state.tau[0] = f32::NAN,
-        2_500 => state.pos[3] = 9_000_000,
+        2_500 => state.pos[0] = 9_000_000,
         5_000 => state.guard_tail ^= 1,
         7_500 => state.source_time_ns -= 50_000_000,
         _ => {}
