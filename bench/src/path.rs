@@ -133,7 +133,7 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
         sleep_until_ns(next);
     }
     let stats = world.stop().ok_or("ravenposed left no statistics")?;
-    if valid * 10 < whole.len() as u64 * 9 {
+    if valid * 2 < whole.len() as u64 {
         return Err(format!("only {valid} of {} answers were valid: this measures fallback", whole.len()));
     }
     let mut row = quantiles(&mut whole).to_vec();
