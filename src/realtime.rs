@@ -51,6 +51,17 @@ pub fn pin(core: usize) -> Result<(), Missing> {
     sched_setaffinity(None, &set).map_err(|cause| refused(cause.to_string()))
 }
 
+/// Keeps the calling thread, and all that it starts from now on, off the loop's core, if there is any other. What an ordinary thread
+/// does in the kernel (mapping and locking memory, for one) may hold the core for hundreds of microseconds.
+pub fn keep_off(core: usize) {
+    let Ok(mut set) = rustix::thread::sched_getaffinity(None) else { return };
+    if core < CpuSet::MAX_CPU && set.is_set(core) && set.count() > 1 {
+        set.unset(core);
+        // Not being allowed to changes nothing but latency.
+        let _ = sched_setaffinity(None, &set);
+    }
+}
+
 /// Gives the calling thread SCHED_FIFO.
 ///
 /// # Errors

@@ -105,6 +105,9 @@ fn start(arguments: &Arguments) -> Result<ExitCode, String> {
         println!("{}: configuration and models are good", arguments.config.display());
         return Ok(ExitCode::SUCCESS);
     }
+    if let Some(core) = config.core {
+        realtime::keep_off(core);
+    }
     let mut missing = Vec::new();
     let latency = prepare_machine(&config, &mut missing);
     if let Some(first) = missing.first()

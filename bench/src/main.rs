@@ -67,7 +67,9 @@ fn measure(runs: usize, seconds: u64) -> Result<(), String> {
     let us = |ns: u64| ns as f64 / 1000.0;
     let baseline = [us(wakeup.p50_ns), us(wakeup.p99_ns), us(wakeup.p999_ns), us(wakeup.max_ns), f64::NAN];
     table.row("this machine: wake-up of a FIFO thread, 10 s", &baseline);
-    for wait in ["sleep", "spin", "event"] {
+    // RAVENPOSE_BENCH_ONLY=sleep measures one way of waiting alone.
+    let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
+    for wait in ["sleep", "spin", "event"].into_iter().filter(|wait| only.as_deref().is_none_or(|only| only == *wait)) {
         path::run(&mut table, wait, service_core, seconds)?;
     }
     println!("{table}");

@@ -129,7 +129,8 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
                 None => missed += 1,
             }
         }
-        next = (next + PERIOD_NS).max(now_ns());
+        // As a controller's timer does: what was missed is skipped, the phase is kept.
+        next += PERIOD_NS * ((now_ns() - next) / PERIOD_NS + 1);
         sleep_until_ns(next);
     }
     let stats = world.stop().ok_or("ravenposed left no statistics")?;
@@ -142,7 +143,7 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
     let mut row = quantiles(&mut handed_over).to_vec();
     row.push(f64::NAN);
     table.row("    the robot's own publish call", &row);
-    for name in ["input_to_output", "inference", "features", "publish", "wakeup"] {
+    for name in ["input_age", "features", "inference", "publish", "total", "input_to_output", "wakeup"] {
         if let Some(stage) = stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
             let us = |ns: u64| ns as f64 / 1000.0;
             table.row(&format!("    {name}"), &[us(stage.p50), us(stage.p99), us(stage.p999), us(stage.max), f64::NAN]);
