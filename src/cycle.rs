@@ -312,7 +312,8 @@ impl<E: Estimator> Cycle<E> {
                 stopwatch.inference_done();
                 judged
             } else {
-                Judgement { reasons: common, information: 0, score: -1.0, target_um: Vector3::zeros() }
+                let (reasons, information) = arm.standing(self.allow_untrained);
+                Judgement { reasons: common | reasons, information, score: -1.0, target_um: Vector3::zeros() }
             };
             arm.advance(&judged, information, &self.newest, index, &self.limits, &mut pose.arm[index]);
         }
@@ -403,6 +404,17 @@ struct Judgement {
 }
 
 impl<E: Estimator> Arm<E> {
+    /// Reasons and information that hold whatever the state is: those of the model.
+    fn standing(&self, allow_untrained: bool) -> (u32, u32) {
+        match &self.model {
+            ArmModel::None => (flag::NO_MODEL, 0),
+            ArmModel::Rejected => (flag::MODEL_REJECTED, 0),
+            ArmModel::Loaded(model) if !model.untrained => (0, 0),
+            ArmModel::Loaded(_) if allow_untrained => (0, flag::UNTRAINED_ALLOWED),
+            ArmModel::Loaded(_) => (flag::UNTRAINED, 0),
+        }
+    }
+
     #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
     fn judge(
         &mut self,
@@ -413,33 +425,17 @@ impl<E: Estimator> Arm<E> {
         limits: &Limits,
         common: u32,
     ) -> Judgement {
-        let mut judged = Judgement { reasons: common, information: 0, score: -1.0, target_um: Vector3::zeros() };
+        let (reasons, information) = self.standing(allow_untrained);
+        let mut judged = Judgement { reasons: common | reasons, information, score: -1.0, target_um: Vector3::zeros() };
         match self.frozen.observe(state, index) {
             FROZEN_AFTER.. => judged.reasons |= flag::INPUT_FROZEN,
             DEGRADED_AFTER.. => judged.information |= flag::DEGRADED,
             _ => {}
         }
-        let model = match &mut self.model {
-            ArmModel::None => {
-                judged.reasons |= flag::NO_MODEL;
-                return judged;
-            }
-            ArmModel::Rejected => {
-                judged.reasons |= flag::MODEL_REJECTED;
-                return judged;
-            }
-            ArmModel::Loaded(model) => model,
-        };
+        let ArmModel::Loaded(model) = &mut self.model else { return judged };
         let verdict = model.guard.check(features);
         judged.reasons |= verdict.reasons;
         judged.score = verdict.score;
-        if model.untrained {
-            if allow_untrained {
-                judged.information |= flag::UNTRAINED_ALLOWED;
-            } else {
-                judged.reasons |= flag::UNTRAINED;
-            }
-        }
         if judged.reasons != 0 {
             return judged;
         }

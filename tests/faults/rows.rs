@@ -1,8 +1,8 @@
 //! One test per row of the fault table that concerns the pure cycle; the name begins with the row.
 
 use crate::common::Rng;
-use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, state};
-use ravenpose::cycle::Counters;
+use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, model as model_of_world, state};
+use ravenpose::cycle::{ArmModel, Counters, Cycle, Limits};
 use ravenpose::guard::Guard;
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, features, flag};
 
@@ -595,4 +595,16 @@ fn a_correction_that_jumps_is_rate_limited_and_flagged() {
     let step: f64 =
         pose.arm[0].correction_um.iter().zip(before.arm[0].correction_um).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
     assert!((step - 100.0).abs() < 1e-6, "{step}");
+}
+
+#[test]
+fn a_model_reason_stands_in_every_message_also_in_repeated_stale_ones() {
+    for (model, reason) in [(ArmModel::None, flag::NO_MODEL), (ArmModel::Rejected, flag::MODEL_REJECTED)] {
+        let mut bench = Bench::new();
+        bench.cycle = Cycle::new(Limits::default(), [model, model_of_world()], false, 0);
+        assert_ne!(bench.good().arm[0].flags & reason, 0);
+        bench.now += 6 * MS;
+        let stale = bench.run(&[]).expect("repeated");
+        assert_eq!(stale.arm[0].flags & (reason | flag::INPUT_STALE), reason | flag::INPUT_STALE);
+    }
 }
