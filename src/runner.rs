@@ -244,7 +244,7 @@ impl<E: Estimator> Runner<E> {
                 Waited::Polled
             }
             Wait::Event => {
-                let deadline = (self.phase.expected_ns(now) + period / 4).min(stale);
+                let deadline = (now + period + period / 4).min(stale);
                 let mut left = deadline - now;
                 while left > 0 && !self.waiting_state() && !self.shared.stop.load(Relaxed) {
                     if let Some(listener) = self.listener() {
@@ -270,13 +270,15 @@ impl<E: Estimator> Runner<E> {
         let found = match (waited, self.misses) {
             (Waited::Polled, 1..=MISSES_MAX) => Found::PollingAfterMiss,
             (Waited::Polled, _) => Found::Polling,
-            (Waited::Slept, 0) => Found::Waiting,
             (Waited::Slept, 1..=MISSES_MAX) => Found::AfterMiss,
-            // Out of a long silence: where in the period it came is unknown.
+            // Before the loop woke, or out of a long silence: where in the period it came is unknown.
             (Waited::Slept, _) => Found::Waiting,
         };
         self.misses = 0;
-        self.phase.learn(found, now_ns);
+        // The other modes wait without a schedule, so there is none to follow.
+        if self.waiting.wait == Wait::Sleep {
+            self.phase.learn(found, now_ns);
+        }
     }
 
     fn poll_until(&mut self, deadline_ns: i64) {

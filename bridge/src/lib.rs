@@ -46,6 +46,21 @@ pub struct Options {
     pub root: *const c_char,
 }
 
+impl Default for Options {
+    /// As `RAVENPOSE_OPTIONS_INIT` has it.
+    fn default() -> Self {
+        Self {
+            abi_version: RAVENPOSE_ABI_VERSION,
+            state_size: size_of::<RavenState>() as u32,
+            pose_size: size_of::<CorrectedPose>() as u32,
+            queue_depth: 0,
+            reserved: [0; 2],
+            prefix: std::ptr::null(),
+            root: std::ptr::null(),
+        }
+    }
+}
+
 fn settings(options: &Options) -> Result<Settings, Code> {
     if options.state_size as usize != size_of::<RavenState>() || options.pose_size as usize != size_of::<CorrectedPose>() {
         return Err(Code::Version);

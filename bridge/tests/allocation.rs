@@ -10,7 +10,7 @@ use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, in_ch
 use ravenpose_bridge::*;
 use ravenpose_transport::{Reader, Settings, Writer, now_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
-use std::ptr::{null, null_mut};
+use std::ptr::null_mut;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering::SeqCst};
 use std::time::Duration;
 
@@ -19,18 +19,6 @@ static ALLOCATOR: Counting = Counting;
 
 const CALLS: u64 = 1_000_000;
 const TEST: &str = "a_million_publishes_and_reads_allocate_nothing_and_call_nothing";
-
-fn options() -> Options {
-    Options {
-        abi_version: RAVENPOSE_ABI_VERSION,
-        state_size: size_of::<RavenState>() as u32,
-        pose_size: size_of::<CorrectedPose>() as u32,
-        queue_depth: 1,
-        reserved: [0; 2],
-        prefix: null(),
-        root: null(),
-    }
-}
 
 #[test]
 fn a_million_publishes_and_reads_allocate_nothing_and_call_nothing() {
@@ -66,8 +54,8 @@ fn million() -> ! {
         let mut reader = null_mut();
         // SAFETY: valid pointers, as the header asks.
         unsafe {
-            assert_eq!(ravenpose_publisher_open(&options(), &raw mut publisher, null_mut(), 0), 0);
-            assert_eq!(ravenpose_pose_reader_open(&options(), &raw mut reader, null_mut(), 0), 0);
+            assert_eq!(ravenpose_publisher_open(&Options::default(), &raw mut publisher, null_mut(), 0), 0);
+            assert_eq!(ravenpose_pose_reader_open(&Options::default(), &raw mut reader, null_mut(), 0), 0);
         }
         let mut pose = CorrectedPose::new();
         let mut got = CorrectedPose::new();

@@ -9,15 +9,7 @@ use std::ffi::{CStr, CString, c_char};
 use std::ptr::{null, null_mut};
 
 fn options(prefix: &Prefix) -> Options {
-    Options {
-        abi_version: RAVENPOSE_ABI_VERSION,
-        state_size: size_of::<RavenState>() as u32,
-        pose_size: size_of::<CorrectedPose>() as u32,
-        queue_depth: 0,
-        reserved: [0; 2],
-        prefix: prefix.0.as_ptr(),
-        root: null(),
-    }
+    Options { prefix: prefix.0.as_ptr(), ..Options::default() }
 }
 
 /// A prefix of its own, whose files are gone when it is dropped.
