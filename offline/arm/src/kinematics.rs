@@ -13,16 +13,16 @@ const INSERTION_FRAME: usize = 2;
 
 /// One row of the table: `T = Rx(alpha) Tx(a) Rz(theta) Tz(d)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Link {
-    alpha_sin: f64,
-    alpha_cos: f64,
-    a_m: f64,
-    theta_offset: f64,
-    d_m: f64,
+pub(crate) struct Link {
+    pub(crate) alpha_sin: f64,
+    pub(crate) alpha_cos: f64,
+    pub(crate) a_m: f64,
+    pub(crate) theta_offset: f64,
+    pub(crate) d_m: f64,
 }
 
 impl Link {
-    fn transform(&self, theta: f64, d_m: f64) -> IsometryMatrix3<f64> {
+    pub(crate) fn transform(&self, theta: f64, d_m: f64) -> IsometryMatrix3<f64> {
         let (sin, cos) = theta.sin_cos();
         let (sa, ca) = (self.alpha_sin, self.alpha_cos);
         let rotation = Matrix3::new(cos, -sin, 0.0, sin * ca, cos * ca, -sa, sin * sa, cos * sa, ca);
@@ -52,6 +52,10 @@ impl Kinematics {
             }
         });
         Self { links }
+    }
+
+    pub(crate) fn links(&self) -> &[Link; FRAMES] {
+        &self.links
     }
 
     /// Pose of the tip: translation in m, rotation, in frame 0 of the arm.

@@ -39,6 +39,11 @@ impl Raven2 {
         Ok(Self { plant: Plant::from_toml(text)? })
     }
 
+    /// A robot with changed numbers of a plant that was read before; they are not checked again.
+    pub fn from_plant(plant: Plant) -> Self {
+        Self { plant }
+    }
+
     /// All parameters of the plant file, also those that no arm function needs (cables, friction, dynamics).
     pub fn plant(&self) -> &Plant {
         &self.plant

@@ -6,13 +6,33 @@
 //! recording does not say and a state needs is assumed, and every assumption comes back as a sentence.
 #![deny(missing_docs)]
 
+pub mod columns235;
+pub mod columns252;
 pub mod csv;
+pub mod describe;
+pub mod open;
+pub mod pairs;
+pub mod save;
 pub mod statefile;
 pub mod states;
 pub mod synthetic;
+pub mod tidy;
 
+pub mod stream;
+pub mod table;
+
+pub mod mcap_file;
+pub mod ros;
+pub mod parquet_file;
+pub mod rosbag_file;
+
+mod aside;
+mod columns;
+mod fields;
+mod file;
 mod recording;
-mod sample;
+mod text;
+pub mod sample;
 
-pub use recording::{Column, Recording};
+pub use recording::{Column, Recording, TextColumn};
 pub use states::{Arms, States};

@@ -5,7 +5,7 @@ use ravenpose_wire::RavenState;
 
 /// Raw encoder counts at motor zero. Homing finds them anew each time; these are made up, of the size that a 24-bit
 /// counter has after it, and the same in every state so that they are constant as in a real recording.
-const ENCODER_OFFSETS: [[f64; JOINTS]; 2] = [
+pub const ENCODER_OFFSETS: [[f64; JOINTS]; 2] = [
     [-4_210.0, 15_873.0, -60_244.0, 2_519.0, -3_307.0, 1_866.0, -745.0],
     [7_938.0, -11_462.0, 52_317.0, -1_984.0, 2_871.0, -1_120.0, 3_605.0],
 ];
@@ -18,38 +18,40 @@ const RUNLEVEL_PEDAL_DOWN: i32 = 3;
 
 /// One cycle of one arm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ArmSample {
+pub struct ArmSample {
     /// Reported joint positions.
-    pub(crate) joints: Joints,
+    pub joints: Joints,
     /// Commanded joint positions.
-    pub(crate) joints_d: Joints,
+    pub joints_d: Joints,
     /// Measured motor angles, rad.
-    pub(crate) motors: Motors,
+    pub motors: Motors,
     /// Commanded motor angles, rad.
-    pub(crate) motors_d: Motors,
+    pub motors_d: Motors,
     /// Motor speeds, rad/s.
-    pub(crate) motor_speeds: Motors,
+    pub motor_speeds: Motors,
     /// Torque before clipping, N·m at the capstan.
-    pub(crate) torque_nm: Motors,
+    pub torque_nm: Motors,
     /// Amplifier commands after clipping, counts.
-    pub(crate) dac: [i32; JOINTS],
+    pub dac: [i32; JOINTS],
+    /// Raw counts at motor zero, as homing found them.
+    pub encoder_offsets: Motors,
 }
 
 /// When a cycle was, and which.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Cycle {
+pub struct Cycle {
     /// Counted from 0.
-    pub(crate) index: u64,
+    pub index: u64,
     /// Time since the first cycle, ns.
-    pub(crate) since_start_ns: i64,
+    pub since_start_ns: i64,
     /// Time stamp of the message, ns.
-    pub(crate) stamp_ns: i64,
+    pub stamp_ns: i64,
     /// Time since the cycle before, ns.
-    pub(crate) dt_ns: i64,
+    pub dt_ns: i64,
 }
 
 /// A state with its header and times, without arms.
-pub(crate) fn state_of(cycle: &Cycle) -> RavenState {
+pub fn state_of(cycle: &Cycle) -> RavenState {
     let mut state = RavenState::new();
     state.seal(cycle.index + 1);
     state.source_time_ns = cycle.since_start_ns;
@@ -66,13 +68,13 @@ pub(crate) fn state_of(cycle: &Cycle) -> RavenState {
 const NS_PER_S: i64 = 1_000_000_000;
 
 /// Writes one arm into a state, in the units as published.
-pub(crate) fn put(state: &mut RavenState, arm: &Arm, sample: &ArmSample) {
+pub fn put(state: &mut RavenState, arm: &Arm, sample: &ArmSample) {
     let side = arm.side.index();
     state.arms |= 1 << side;
     state.type_[side] = BOARD_TYPES[side];
     put_tip(state, arm, sample);
     let counts: [i32; JOINTS] = std::array::from_fn(|i| {
-        arm.encoders.raw_count(i, sample.motors[i] / arm.encoders.rad_per_count(), ENCODER_OFFSETS[side][i])
+        arm.encoders.raw_count(i, sample.motors[i] / arm.encoders.rad_per_count(), sample.encoder_offsets[i])
     });
     let speeds = arm.transmission.published_speeds(&sample.motor_speeds);
     put_slots(&mut state.enc_vals, side, &published::slots(&counts));
@@ -84,7 +86,7 @@ pub(crate) fn put(state: &mut RavenState, arm: &Arm, sample: &ArmSample) {
     put_slots(&mut state.jvel, side, &published::degrees(&speeds));
     put_slots(&mut state.mpos_d, side, &published::degrees(&sample.motors_d));
     put_slots(&mut state.jpos_d, side, &published::degrees(&sample.joints_d));
-    put_slots(&mut state.encoffsets, side, &published::slots(&ENCODER_OFFSETS[side].map(|count| count as f32)));
+    put_slots(&mut state.encoffsets, side, &published::slots(&sample.encoder_offsets.map(|count| count as f32)));
     state.grasp_d[side] = published::grasp(kinematics::jaw_opening(&sample.joints_d));
     let jac = published::jac_vel(arm.side, &sample.joints, &speeds);
     put_slots(&mut state.jac_vel, side, &jac);
@@ -115,7 +117,7 @@ fn dac_on_other_arm(from: &Arm, to: &Arm, dac: &[i32; JOINTS]) -> [i32; JOINTS] 
 }
 
 /// The same joints on the other arm: its tool motors turn the other way with motor 3.
-pub(crate) fn on_other_arm(from: &Arm, to: &Arm, sample: &ArmSample) -> ArmSample {
+pub fn on_other_arm(from: &Arm, to: &Arm, sample: &ArmSample) -> ArmSample {
     if from.side == to.side {
         return *sample;
     }
@@ -125,6 +127,7 @@ pub(crate) fn on_other_arm(from: &Arm, to: &Arm, sample: &ArmSample) -> ArmSampl
         motors_d: to.transmission.motors_at(&sample.joints_d, sample.motors[2]),
         motor_speeds: to.transmission.motors_at(&joint_rates, sample.motor_speeds[2]),
         dac: dac_on_other_arm(from, to, &sample.dac),
+        encoder_offsets: ENCODER_OFFSETS[to.side.index()],
         ..*sample
     };
     // The cables of joints 1 to 3 are the same on both arms: spare them the rounding of the way there and back.
@@ -134,6 +137,6 @@ pub(crate) fn on_other_arm(from: &Arm, to: &Arm, sample: &ArmSample) -> ArmSampl
 }
 
 /// An arm with its nominal tool.
-pub(crate) fn nominal(side: Side) -> Arm {
+pub fn nominal(side: Side) -> Arm {
     arm::Raven2::nominal().arm(side)
 }

@@ -136,7 +136,8 @@ impl MovingArm {
         }
         let dac = std::array::from_fn(|i| self.arm.amplifiers.counts(i, torque_nm[i]));
         let joints_d = self.joints_of_command(&motors_d, motors[2]);
-        ArmSample { joints, joints_d, motors, motors_d, motor_speeds, torque_nm, dac }
+        let encoder_offsets = sample::ENCODER_OFFSETS[self.arm.side.index()];
+        ArmSample { joints, joints_d, motors, motors_d, motor_speeds, torque_nm, dac, encoder_offsets }
     }
 
     fn counts(&self, time_s: f64) -> Motors {

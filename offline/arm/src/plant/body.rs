@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::{PlantError, finite, positive};
 use crate::{JOINTS, Side};
 
 /// `[kinematics]`: modified Denavit-Hartenberg tables (raven2-plant.md, section 2).
@@ -52,6 +53,16 @@ pub struct SideKinematics {
     pub theta_offset_deg: [f64; 6],
     /// Frame 0 in the world of the paper's laboratory, where known.
     pub frame0_to_world_mm: Option<WorldFrame>,
+}
+
+impl SideKinematics {
+    /// Every number finite?
+    pub(super) fn check(&self, side: &str) -> Result<(), PlantError> {
+        finite(&format!("kinematics.{side}.alpha_deg"), &self.alpha_deg)?;
+        finite(&format!("kinematics.{side}.a_m"), &self.a_m)?;
+        finite(&format!("kinematics.{side}.d_m"), &self.d_m.each_ref().map(LengthEntry::constant_m))?;
+        finite(&format!("kinematics.{side}.theta_offset_deg"), &self.theta_offset_deg)
+    }
 }
 
 /// A length of the table: a constant, or the insertion joint.
@@ -145,6 +156,19 @@ pub struct Link {
     pub com_m: [f64; 3],
     /// Inertia about the centre of mass, kg·m².
     pub inertia_com_kg_m2: [[f64; 3]; 3],
+}
+
+impl Dynamics {
+    /// Masses positive, every number finite?
+    pub(super) fn check(&self, side: &str) -> Result<(), PlantError> {
+        for (number, link) in [(1, &self.link1), (2, &self.link2), (3, &self.link3)] {
+            let key = format!("dynamics.{side}.link{number}");
+            positive(&format!("{key}.mass_kg"), &[link.mass_kg])?;
+            finite(&format!("{key}.com_m"), &link.com_m)?;
+            finite(&format!("{key}.inertia_com_kg_m2"), link.inertia_com_kg_m2.as_flattened())?;
+        }
+        Ok(())
+    }
 }
 
 /// A coefficient and its monomial in `s1 c1 s2 c2 d`.

@@ -100,8 +100,12 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Checks what types cannot: the schema, and every number that is divided by.
-    fn check(&self) -> Result<(), PlantError> {
+    /// Checks what types cannot: the schema, every number that is divided by, and the numbers of the rigid body.
+    /// [`Self::from_toml`] has done it; do it after changing a plant by hand.
+    ///
+    /// # Errors
+    /// [`PlantError`] with the key and what is wrong with it.
+    pub fn check(&self) -> Result<(), PlantError> {
         if self.schema != SCHEMA {
             return Err(PlantError::Schema { found: self.schema.clone() });
         }
@@ -122,6 +126,11 @@ impl Plant {
         }
         insertion_is_third("kinematics.gold.d_m", &self.kinematics.gold)?;
         insertion_is_third("kinematics.green.d_m", &self.kinematics.green)?;
+        finite("kinematics.gravity_m_s2", &self.kinematics.gravity_m_s2)?;
+        self.kinematics.gold.check("gold")?;
+        self.kinematics.green.check("green")?;
+        self.dynamics.gold.check("gold")?;
+        self.dynamics.green.check("green")?;
         ordered(&self.limits)
     }
 }
@@ -129,6 +138,10 @@ impl Plant {
 fn positive(key: &str, values: &[f64]) -> Result<(), PlantError> {
     let good = values.iter().all(|value| value.is_finite() && *value > 0.0);
     check(good, key, "must be positive")
+}
+
+fn finite<'a>(key: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), PlantError> {
+    check(values.into_iter().all(|value| value.is_finite()), key, "must be finite")
 }
 
 fn unit_signs(key: &str, signs: &[i32; JOINTS]) -> Result<(), PlantError> {
@@ -211,6 +224,9 @@ mod tests {
         assert!(refused("gb_ratio = 2.9", "gb_ratio = -2.9").contains("transmission.gb_ratio"));
         assert!(refused("dac_sign_gold = [-1,", "dac_sign_gold = [2,").contains("motor.dac_sign_gold"));
         assert!(refused("min = [0.0,", "min = [9.0,").contains("limits.min"));
+        assert!(refused("alpha_deg = [0.0,", "alpha_deg = [nan,").contains("kinematics.gold.alpha_deg must be finite"));
+        assert!(refused("mass_kg = 0.753", "mass_kg = -0.753").contains("dynamics.gold.link2.mass_kg must be positive"));
+        assert!(refused("com_m = [-0.00717635999859,", "com_m = [inf,").contains("dynamics.green.link1.com_m must be finite"));
         assert!(refused("\"jpos_3\", -0.47", "0.1, \"jpos_3\"").contains("kinematics.gold.d_m"));
         assert!(refused("\"jpos_3\"", "\"jpos_2\"").contains("plant file"));
     }

@@ -3,12 +3,15 @@
 use super::error::CsvProblem;
 
 /// What a column of the file becomes.
-pub(super) struct Field {
-    pub(super) name: String,
-    pub(super) known: bool,
+pub(crate) struct Field {
+    /// Name with the SI unit for a known quantity, that of the file otherwise.
+    pub(crate) name: String,
+    /// Is the quantity one of the table?
+    pub(crate) known: bool,
     /// May cells be empty?
     pub(super) truth: bool,
-    pub(super) to_si: fn(f64) -> f64,
+    /// From the unit of the file.
+    pub(crate) to_si: fn(f64) -> f64,
 }
 
 /// A unit of the file, the SI unit that it becomes, and the conversion.
@@ -97,8 +100,34 @@ pub(super) fn field(name: &str, origin_names: bool) -> Result<Field, CsvProblem>
     }
 }
 
+/// Every column of a header; what the table of tidy CSV cannot take stays as it is in the file.
+pub(crate) fn loose_fields(names: &[&str]) -> Vec<Field> {
+    let origin_names = has_origin_names(names);
+    let mut fields: Vec<Field> = Vec::with_capacity(names.len());
+    for name in names {
+        let found = field(name, origin_names).unwrap_or_else(|_| unknown(name));
+        let is_taken = found.name != *name && (names.contains(&found.name.as_str()) || fields.iter().any(|other| other.name == found.name));
+        fields.push(if is_taken { unknown(name) } else { found });
+    }
+    fields
+}
+
+/// Is this the name of a known quantity in its SI unit?
+pub(crate) fn is_si_name(name: &str) -> bool {
+    field(name, false).is_ok_and(|field| field.known && field.name == name)
+}
+
+/// Unit at the end of a name, `_rad` or `_m_s`, in any case.
+pub(crate) fn unit_of_name(name: &str) -> Option<&'static str> {
+    let lower = name.to_ascii_lowercase();
+    let ends_with = |unit: &&Unit| lower.strip_suffix(unit.name).is_some_and(|rest| rest.ends_with('_') && rest.len() > 1);
+    UNITS.iter().filter(ends_with).max_by_key(|unit| unit.name.len()).map(|unit| unit.name)
+}
+
 fn unknown(name: &str) -> Field {
-    Field { name: name.to_owned(), known: false, truth: false, to_si: same }
+    // Truth comes at its own rate, also truth that the table does not name (orientation, cable forces).
+    let truth = name.to_ascii_lowercase().contains("truth_");
+    Field { name: name.to_owned(), known: false, truth, to_si: same }
 }
 
 /// Joint number and unit, if the name is that of the quantity. A quantity without a joint number also matches with any

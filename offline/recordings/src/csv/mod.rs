@@ -1,24 +1,29 @@
 //! Tidy CSV (contracts.md): one run per file, `.csv` or `.csv.gz`, `# key = value` lines above the header, units in the
-//! column names. The reader converts to SI and refuses what it cannot vouch for, with one line that tells the remedy.
+//! column names.
+//!
+//! [`read`] is for those who use a run: it converts to SI and refuses what it cannot vouch for, with one line that tells
+//! the remedy. [`Table`] is for those who look at files or convert them: it streams, takes any table of numbers and words
+//! as it is, and says what is odd about it. [`Writer`] writes either.
 
+mod cells;
 mod error;
 mod header;
+mod kinds;
+mod loose;
+mod write;
 
 pub use error::{CsvError, CsvProblem};
+pub use loose::Table;
+pub use write::Writer;
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read};
+pub(crate) use header::{is_si_name, loose_fields, unit_of_name};
+
 use std::path::Path;
 
-use flate2::bufread::MultiGzDecoder;
 use header::Field;
 
-use crate::{Column, Recording};
-
-/// Longest line that is read, bytes: a file without line ends must not fill the memory.
-const LINE_BYTES_MAX: u64 = 1 << 20;
-
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+use crate::file::{Input, InputProblem, LINE_BYTES_MAX, LineProblem, Lines};
+use crate::{Column, Recording, text};
 
 /// Reads a tidy CSV file, compressed or not.
 ///
@@ -26,23 +31,9 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// [`CsvError`], whose text is one line with file, place, what is wrong and the remedy.
 pub fn read(path: &Path) -> Result<Recording, CsvError> {
     let name = path.display().to_string();
-    let failed = |problem| CsvError { file: name.clone(), line: None, column: None, problem: Box::new(problem) };
-    let mut file = File::open(path).map_err(|error| failed(CsvProblem::Open { why: error.to_string() }))?;
-    let mut magic = Vec::new();
-    let _ = file
-        .by_ref()
-        .take(GZIP_MAGIC.len() as u64)
-        .read_to_end(&mut magic)
-        .map_err(|error| failed(CsvProblem::Read { why: error.to_string() }))?;
-    let compressed = magic == GZIP_MAGIC;
-    if !compressed && name.to_ascii_lowercase().ends_with(".gz") {
-        return Err(failed(CsvProblem::NotGzip));
-    }
-    let whole = BufReader::new(Cursor::new(magic).chain(file));
-    if compressed {
-        Reader::new(&name, BufReader::new(MultiGzDecoder::new(whole)), true).recording()
-    } else {
-        Reader::new(&name, whole, false).recording()
+    match Input::open(path) {
+        Ok(input) => Reader::new(&name, input).recording(),
+        Err(problem) => Err(CsvError { file: name, line: None, column: None, problem: Box::new(of_input(&problem)) }),
     }
 }
 
@@ -51,20 +42,44 @@ pub fn read(path: &Path) -> Result<Recording, CsvError> {
 /// # Errors
 /// As [`read`].
 pub fn read_text(name: &str, text: &[u8]) -> Result<Recording, CsvError> {
-    Reader::new(name, text, false).recording()
+    match Input::from_bytes(text.to_vec()) {
+        Ok(input) => Reader::new(name, input).recording(),
+        Err(error) => {
+            let problem = Box::new(of_input(&InputProblem::Read(error)));
+            Err(CsvError { file: name.to_owned(), line: None, column: None, problem })
+        }
+    }
 }
 
-struct Reader<'a, R> {
+fn of_input(problem: &InputProblem) -> CsvProblem {
+    match problem {
+        InputProblem::Open(error) => CsvProblem::Open { why: error.to_string() },
+        InputProblem::Read(error) => CsvProblem::Read { why: error.to_string() },
+        InputProblem::NotGzip => CsvProblem::NotGzip,
+    }
+}
+
+/// Is this a header of column names separated by commas?
+fn check_names(names: &[&str]) -> Result<(), CsvProblem> {
+    if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+        return Err(CsvProblem::NoHeader);
+    }
+    if let [only] = names
+        && let Some((_, found)) = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")].iter().find(|(c, _)| only.contains(*c))
+    {
+        return Err(CsvProblem::Separator { found });
+    }
+    Ok(())
+}
+
+struct Reader<'a> {
     file: &'a str,
-    source: R,
-    compressed: bool,
-    line: u64,
-    bytes: Vec<u8>,
+    lines: Lines,
 }
 
-impl<'a, R: BufRead> Reader<'a, R> {
-    fn new(file: &'a str, source: R, compressed: bool) -> Self {
-        Self { file, source, compressed, line: 0, bytes: Vec::new() }
+impl<'a> Reader<'a> {
+    fn new(file: &'a str, input: Input) -> Self {
+        Self { file, lines: Lines::new(input) }
     }
 
     fn recording(mut self) -> Result<Recording, CsvError> {
@@ -79,16 +94,23 @@ impl<'a, R: BufRead> Reader<'a, R> {
         if values.first().is_none_or(Vec::is_empty) {
             return Err(self.whole_file(CsvProblem::NoRows));
         }
-        recording.columns =
-            fields.into_iter().zip(values).map(|(field, values)| Column { name: field.name, known: field.known, values }).collect();
+        recording.columns = std::iter::zip(fields.into_iter().zip(&names), values)
+            .map(|((field, name), values)| Column {
+                name: field.name,
+                known: field.known,
+                values,
+                original: (*name).to_owned(),
+            })
+            .collect();
         Ok(recording)
     }
 
     /// Reads metadata up to the header line; none at the end of the file.
     fn header(&mut self, recording: &mut Recording) -> Result<Option<String>, CsvError> {
-        while let Some(text) = self.next_line()? {
+        while self.advance()? {
+            let text = self.text()?;
             let Some(comment) = text.strip_prefix('#') else {
-                return Ok(Some(text));
+                return Ok(Some(text.to_owned()));
             };
             let Some((key, value)) = comment.split_once('=') else { continue };
             let (key, value) = (key.trim(), value.trim());
@@ -103,14 +125,7 @@ impl<'a, R: BufRead> Reader<'a, R> {
     }
 
     fn fields(&self, names: &[&str]) -> Result<Vec<Field>, CsvError> {
-        if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return Err(self.here(CsvProblem::NoHeader));
-        }
-        if let [only] = names
-            && let Some((_, found)) = [(';', "semicolons"), ('\t', "tabs"), (' ', "spaces")].iter().find(|(c, _)| only.contains(*c))
-        {
-            return Err(self.here(CsvProblem::Separator { found }));
-        }
+        check_names(names).map_err(|problem| self.here(problem))?;
         let origin_names = header::has_origin_names(names);
         let mut fields: Vec<Field> = Vec::with_capacity(names.len());
         for (i, name) in names.iter().enumerate() {
@@ -129,7 +144,8 @@ impl<'a, R: BufRead> Reader<'a, R> {
 
     fn rows(&mut self, names: &[&str], fields: &[Field], values: &mut [Vec<f64>]) -> Result<(), CsvError> {
         let is_run = fields.first().is_some_and(|field| field.name == "t_s");
-        while let Some(text) = self.next_line()? {
+        while self.advance()? {
+            let text = self.text()?;
             if text.starts_with('#') {
                 return Err(self.here(CsvProblem::CommentInData));
             }
@@ -151,31 +167,22 @@ impl<'a, R: BufRead> Reader<'a, R> {
         Ok(())
     }
 
-    /// The next line that is not empty, without its end.
-    fn next_line(&mut self) -> Result<Option<String>, CsvError> {
-        loop {
-            self.bytes.clear();
-            self.line += 1;
-            let mut bounded = self.source.by_ref().take(LINE_BYTES_MAX + 1);
-            if let Err(error) = bounded.read_until(b'\n', &mut self.bytes) {
-                let why = error.to_string();
-                return Err(self.here(if self.compressed { CsvProblem::Gzip { why } } else { CsvProblem::Read { why } }));
-            }
-            if self.bytes.is_empty() {
-                return Ok(None);
-            }
-            if self.bytes.len() as u64 > LINE_BYTES_MAX {
-                return Err(self.here(CsvProblem::LineTooLong { bytes: LINE_BYTES_MAX }));
-            }
-            let Ok(text) = std::str::from_utf8(&self.bytes) else {
-                return Err(self.here(CsvProblem::NotText));
-            };
-            // Spreadsheets write a byte order mark before the first line.
-            let text = if self.line == 1 { text.trim_start_matches('\u{feff}') } else { text };
-            let text = text.trim_matches(['\r', '\n', ' ']);
-            if !text.is_empty() {
-                return Ok(Some(text.to_owned()));
-            }
+    /// Moves to the next line that is not empty; false at the end of the file.
+    fn advance(&mut self) -> Result<bool, CsvError> {
+        self.lines.advance().map_err(|problem| {
+            self.here(match problem {
+                LineProblem::Read(error) => CsvProblem::Read { why: error.to_string() },
+                LineProblem::Gzip(error) => CsvProblem::Gzip { why: error.to_string() },
+                LineProblem::TooLong => CsvProblem::LineTooLong { bytes: LINE_BYTES_MAX as u64 },
+            })
+        })
+    }
+
+    /// The present line, without its end and blanks round it.
+    fn text(&self) -> Result<&str, CsvError> {
+        match std::str::from_utf8(self.lines.line()) {
+            Ok(text) => Ok(text.trim_matches(['\r', ' '])),
+            Err(_) => Err(self.here(CsvProblem::NotText)),
         }
     }
 
@@ -184,7 +191,7 @@ impl<'a, R: BufRead> Reader<'a, R> {
     }
 
     fn here(&self, problem: CsvProblem) -> CsvError {
-        CsvError { line: Some(self.line), ..self.whole_file(problem) }
+        CsvError { line: Some(self.lines.number()), ..self.whole_file(problem) }
     }
 
     fn at(&self, index: usize, name: &str, problem: CsvProblem) -> CsvError {
@@ -202,9 +209,9 @@ fn number(text: &str, field: &Field) -> Result<f64, CsvProblem> {
     if text.is_empty() {
         return if field.truth { Ok(f64::NAN) } else { Err(CsvProblem::EmptyCell) };
     }
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok((field.to_si)(value)),
-        Ok(_) => Err(CsvProblem::NotFinite { text: text.to_owned() }),
-        Err(_) => Err(CsvProblem::NotNumber { text: text.to_owned() }),
+    match text::number(text.as_bytes()) {
+        Some(value) if value.is_finite() => Ok((field.to_si)(value)),
+        Some(_) => Err(CsvProblem::NotFinite { text: text.to_owned() }),
+        None => Err(CsvProblem::NotNumber { text: text.to_owned() }),
     }
 }

@@ -10,7 +10,7 @@ use arm::{Arm, JOINTS, Joints, Side};
 use ravenpose_wire::RavenState;
 
 use crate::Recording;
-use crate::sample::{self, ArmSample, Cycle};
+use crate::sample::{ArmSample, Cycle, ENCODER_OFFSETS, self};
 use channels::Channels;
 
 /// Which arms the states show.
@@ -178,7 +178,8 @@ fn standing(channels: &Channels, arm: &Arm, row: usize) -> ArmSample {
         Some(counts) => counts.round() as i32,
         None => arm.amplifiers.counts(i, torque_nm[i]),
     });
-    ArmSample { joints, joints_d, motors, motors_d, motor_speeds: [0.0; JOINTS], torque_nm, dac }
+    let encoder_offsets = ENCODER_OFFSETS[arm.side.index()];
+    ArmSample { joints, joints_d, motors, motors_d, motor_speeds: [0.0; JOINTS], torque_nm, dac, encoder_offsets }
 }
 
 /// Tool motors that are not recorded follow motor 3 in speed as in position, with the tool joints at rest.

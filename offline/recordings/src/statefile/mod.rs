@@ -14,13 +14,22 @@
 //!
 //! Record `i` has sequence `i + 1` and a time relative to the start; whoever replays it writes the time anew.
 //!
+//! [`read`] and [`write()`] hold all states in memory and refuse whatever is damaged; [`Reader`] and [`Writer`] stream, and a
+//! damaged file yields what stands before the damage.
+//!
 //! This module contains `unsafe`: records are written and read as the bytes of a repr(C) struct.
+
+mod stream;
+
+pub use stream::{LOSSES, Reader, Writer};
 
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use ravenpose_wire::{RavenState, Refusal};
+
+use crate::file::WholeFile;
 
 /// First eight bytes.
 pub const MAGIC: [u8; 8] = *b"RVNSTATE";
@@ -142,12 +151,7 @@ pub enum StateFileProblem {
 pub fn write(path: &Path, states: &[RavenState], period_ns: i64) -> Result<(), StateFileError> {
     let failed = |problem| StateFileError { file: path.to_owned(), problem };
     check_period(period_ns).and_then(|()| check_records(states)).map_err(failed)?;
-    let temporary = temporary_beside(path);
-    let written = write_and_rename(&temporary, path, states, period_ns);
-    if written.is_err() {
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written.map_err(|error| failed(StateFileProblem::Write(error)))
+    write_whole(path, states, period_ns).map_err(|error| failed(StateFileProblem::Write(error)))
 }
 
 /// Reads and checks a state file.
@@ -158,25 +162,12 @@ pub fn read(path: &Path) -> Result<StateFile, StateFileError> {
     read_checked(path).map_err(|problem| StateFileError { file: path.to_owned(), problem })
 }
 
-fn write_and_rename(temporary: &Path, path: &Path, states: &[RavenState], period_ns: i64) -> std::io::Result<()> {
+fn write_whole(path: &Path, states: &[RavenState], period_ns: i64) -> std::io::Result<()> {
     let records = as_bytes(states);
-    let mut file = File::create(temporary)?;
+    let mut file = WholeFile::create(path)?;
     file.write_all(&header(states.len() as u64, period_ns, fnv1a(records)))?;
     file.write_all(records)?;
-    file.sync_all()?;
-    std::fs::rename(temporary, path)?;
-    // The rename itself reaches the disk with the folder.
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => File::open(folder)?.sync_all(),
-        _ => File::open(".")?.sync_all(),
-    }
-}
-
-fn temporary_beside(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
-    path.with_file_name(name)
+    file.finish()
 }
 
 fn header(count: u64, period_ns: i64, hash: u64) -> [u8; HEADER_BYTES] {
@@ -244,20 +235,31 @@ fn check_records(states: &[RavenState]) -> Result<(), StateFileProblem> {
         return Err(StateFileProblem::Empty);
     }
     for (index, state) in states.iter().enumerate() {
-        let what = match state.admit() {
-            Err(Refusal::Layout) => "has another layout",
-            Err(Refusal::Torn) => "is torn",
-            Ok(()) if state.sequence != index as u64 + 1 => "is out of sequence",
-            Ok(()) => continue,
-        };
-        return Err(StateFileProblem::Record { index, what });
+        check_record(index as u64, state).map_err(|what| StateFileProblem::Record { index, what })?;
     }
     Ok(())
 }
 
+/// What is wrong with a record, counted from 0.
+fn check_record(index: u64, state: &RavenState) -> Result<(), &'static str> {
+    match state.admit() {
+        Err(Refusal::Layout) => Err("has another layout"),
+        Err(Refusal::Torn) => Err("is torn"),
+        Ok(()) if state.sequence != index + 1 => Err("is out of sequence"),
+        Ok(()) => Ok(()),
+    }
+}
+
 /// FNV-1a, 64 bits (Fowler, Noll, Vo; offset basis and prime of the authors' page): against damage, not against malice.
 pub fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    fnv1a_on(FNV_BASIS, bytes)
+}
+
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Goes on hashing.
+fn fnv1a_on(hash: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(hash, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 fn as_bytes(states: &[RavenState]) -> &[u8] {

@@ -1,0 +1,14 @@
+//! `cargo run --release -p ravenpose-plot --example overview RUN.csv OUT.html [OUT.svg]`: the page of a tidy CSV.
+
+use std::path::Path;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [input, page, rest @ ..] = arguments.as_slice() else { return Err("usage: overview RUN.csv OUT.html [OUT.svg]".into()) };
+    let recording = recordings::csv::read(Path::new(input))?;
+    std::fs::write(page, plot::overview(&recording, &plot::Options::default())?)?;
+    if let Some(svg) = rest.first() {
+        std::fs::write(svg, plot::overview_svg(&recording, &plot::Options::default())?)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! Which columns hold words, and what stands in columns of numbers that is none.
+
+use super::cells::{self, Split};
+use crate::file::Lines;
+use crate::table::TableColumn;
+use crate::text;
+
+/// Text that is looked at to tell words from numbers, bytes.
+const PROBE_BYTES: usize = 16 << 20;
+
+/// A column is one of words if at least one in so many of its cells is no number; fewer are damage.
+const WORDS_ONE_IN: u64 = 10;
+
+/// Largest whole number up to which a double holds every whole number.
+const EXACT_MAX: f64 = 9_007_199_254_740_992.0;
+
+/// A number that a double holds as it is written, none for anything else. A long whole number (nanoseconds since 1970) that
+/// would be changed is no number here.
+fn exact(cell: &str) -> Option<f64> {
+    let value = text::number(cell.as_bytes())?;
+    if value.abs() >= EXACT_MAX && value.is_finite() && cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-' || byte == b'+') {
+        let same = cell.parse::<i128>().is_ok_and(|whole| whole as f64 == value && value as i128 == whole);
+        return same.then_some(value);
+    }
+    Some(value)
+}
+
+/// Reads on as far as the probe goes; true for each column of words.
+pub(super) fn columns_of_words(lines: &mut Lines, columns: &[TableColumn]) -> Vec<bool> {
+    let mut filled = vec![0_u64; columns.len()];
+    let mut words = vec![0_u64; columns.len()];
+    let mut bytes = 0;
+    while bytes < PROBE_BYTES && lines.advance().unwrap_or(false) {
+        if lines.line().first() == Some(&b'#') {
+            continue;
+        }
+        if cells::complete_row(lines).is_err() {
+            break;
+        }
+        let Ok(row) = cells::row_text(lines) else { break };
+        bytes += row.len();
+        let Ok(split) = Split::of(row, columns.len()) else { break };
+        for ((cell, filled), words) in split.zip(&mut filled).zip(&mut words) {
+            *filled += u64::from(!cell.is_empty());
+            *words += u64::from(!cell.is_empty() && exact(&cell).is_none());
+        }
+    }
+    filled.iter().zip(&words).map(|(filled, words)| *words > 0 && *words >= filled / WORDS_ONE_IN).collect()
+}
+
+/// Cells in columns of numbers that are none.
+#[derive(Debug, Default)]
+pub(super) struct Kinds {
+    line: u64,
+    bad: Vec<Option<BadCells>>,
+}
+
+#[derive(Debug)]
+struct BadCells {
+    count: u64,
+    line: u64,
+    text: String,
+}
+
+impl Kinds {
+    pub(super) fn new(columns: usize) -> Self {
+        Self { line: 0, bad: std::iter::repeat_with(|| None).take(columns).collect() }
+    }
+
+    /// The row that follows stands on this line.
+    pub(super) fn row(&mut self, line: u64) {
+        self.line = line;
+    }
+
+    /// The number in a cell; NaN for an empty one and for what is no number.
+    pub(super) fn number(&mut self, place: usize, cell: &str) -> f64 {
+        if cell.is_empty() {
+            return f64::NAN;
+        }
+        if let Some(value) = exact(cell) {
+            return value;
+        }
+        let (line, text) = (self.line, || cell.chars().take(24).collect());
+        if let Some(bad) = self.bad.get_mut(place) {
+            bad.get_or_insert_with(|| BadCells { count: 0, line, text: text() }).count += 1;
+        }
+        f64::NAN
+    }
+
+    /// One sentence for each column with such cells.
+    pub(super) fn findings(&self, columns: &[TableColumn]) -> impl Iterator<Item = String> {
+        self.bad.iter().zip(columns).filter_map(|(bad, column)| {
+            let bad = bad.as_ref()?;
+            Some(format!(
+                "column `{}`: {} cells are no numbers that can be kept (first in line {}: `{}`), taken as missing",
+                column.name.escape_debug(),
+                bad.count,
+                bad.line,
+                bad.text.escape_debug()
+            ))
+        })
+    }
+}

@@ -1,0 +1,221 @@
+//! Any CSV as a table, in bounded memory: for `info` and `convert`, which have to say what is in a file rather than refuse it.
+//!
+//! Times may repeat or jump, the time may stand in any column, cells may be empty, columns may hold words. Where a row
+//! cannot be understood the table ends, and [`Table::damage`](TableSource::damage) says where; what could be mended is told
+//! by [`Table::findings`](TableSource::findings). A file without a header is still refused.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use super::cells::{self, Split};
+use super::error::CsvProblem;
+use super::kinds::{self, Kinds};
+use crate::file::{Input, InputProblem, LineProblem, Lines, refusal};
+use crate::stream::{Damage, Place, StreamError};
+use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
+
+/// A CSV file being read as a table.
+pub struct Table {
+    lines: Lines,
+    columns: Vec<TableColumn>,
+    metadata: Vec<(String, String)>,
+    findings: Vec<String>,
+    damage: Option<Damage>,
+    done: bool,
+    comments: u64,
+    kinds: Kinds,
+}
+
+impl Table {
+    /// Opens a file, compressed or not. Its first 16 MiB of text are read twice: what they hold decides which columns are
+    /// words.
+    ///
+    /// # Errors
+    /// [`StreamError`] where the file cannot be opened or has no header of column names.
+    pub fn open(path: &Path) -> Result<Self, StreamError> {
+        Self::new(path, &mut || Input::open(path))
+    }
+
+    /// The same from memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub fn from_bytes(name: &Path, bytes: &[u8]) -> Result<Self, StreamError> {
+        Self::new(name, &mut || Input::from_bytes(bytes.to_vec()).map_err(InputProblem::Read))
+    }
+
+    fn new(path: &Path, open: &mut dyn FnMut() -> Result<Input, InputProblem>) -> Result<Self, StreamError> {
+        let mut probe = Self::at_first_row(path, open)?;
+        let is_text = kinds::columns_of_words(&mut probe.lines, &probe.columns);
+        let mut table = Self::at_first_row(path, open)?;
+        for (column, is_text) in table.columns.iter_mut().zip(is_text) {
+            column.text = is_text;
+        }
+        table.kinds = Kinds::new(table.columns.len());
+        Ok(table)
+    }
+
+    /// Reads metadata and header.
+    fn at_first_row(path: &Path, open: &mut dyn FnMut() -> Result<Input, InputProblem>) -> Result<Self, StreamError> {
+        let mut lines = Lines::new(open().map_err(|problem| problem.refusal(path))?);
+        let mut head = Head { path: path.to_owned(), metadata: Vec::new() };
+        let names = head.names(&mut lines)?;
+        let (columns, findings) = distinct(names);
+        Ok(Self {
+            lines,
+            columns,
+            metadata: head.metadata,
+            findings,
+            damage: None,
+            done: false,
+            comments: 0,
+            kinds: Kinds::new(0),
+        })
+    }
+
+    /// Appends a row to the batch; false at the end or at the damage.
+    fn row(&mut self, batch: &mut Batch) -> Result<bool, String> {
+        loop {
+            if !self.lines.advance().map_err(|problem| problem.what())? {
+                return Ok(false);
+            }
+            if self.lines.line().first() != Some(&b'#') {
+                break;
+            }
+            self.comments += 1;
+        }
+        cells::complete_row(&mut self.lines)?;
+        let split = Split::of(cells::row_text(&self.lines)?, self.columns.len())?;
+        self.kinds.row(self.lines.number());
+        for (place, (cell, to)) in split.zip(&mut batch.columns).enumerate() {
+            match to {
+                ColumnCells::Numbers(values) => values.push(self.kinds.number(place, &cell)),
+                ColumnCells::Texts(texts) => texts.push(&cell),
+            }
+        }
+        Ok(true)
+    }
+}
+
+impl TableSource for Table {
+    fn format(&self) -> &'static str {
+        "tidy CSV"
+    }
+
+    fn metadata(&self) -> &[(String, String)] {
+        &self.metadata
+    }
+
+    fn columns(&self) -> &[TableColumn] {
+        &self.columns
+    }
+
+    fn progress(&self) -> (u64, u64) {
+        self.lines.progress()
+    }
+
+    fn next(&mut self, batch: &mut Batch) -> Result<bool, StreamError> {
+        batch.clear();
+        while !self.done && batch.rows() < BATCH_ROWS {
+            match self.row(batch) {
+                Ok(true) => {}
+                Ok(false) => self.done = true,
+                Err(what) => {
+                    self.damage = Some(Damage { place: Place::Line(self.lines.number()), what });
+                    self.done = true;
+                }
+            }
+        }
+        Ok(batch.rows() > 0)
+    }
+
+    fn damage(&self) -> Option<&Damage> {
+        self.damage.as_ref()
+    }
+
+    fn findings(&self) -> Vec<String> {
+        let mut findings = self.findings.clone();
+        findings.extend(self.kinds.findings(&self.columns));
+        if self.comments > 0 {
+            findings.push(format!("{} comment lines below the header were passed over", self.comments));
+        }
+        if self.done && self.damage.is_none() && !self.lines.ended() {
+            findings.push("the last line has no line end: if the file was cut, its last cell may be too".to_owned());
+        }
+        findings
+    }
+}
+
+/// What stands above the rows.
+struct Head {
+    path: PathBuf,
+    metadata: Vec<(String, String)>,
+}
+
+impl Head {
+    /// Reads metadata lines up to the header; returns its names.
+    fn names(&mut self, lines: &mut Lines) -> Result<Vec<String>, StreamError> {
+        loop {
+            match lines.advance() {
+                Ok(true) => {}
+                Ok(false) => return Err(self.problem(None, &CsvProblem::Empty)),
+                Err(LineProblem::TooLong) => {
+                    let bytes = crate::file::LINE_BYTES_MAX as u64;
+                    return Err(self.problem(Some(lines.number()), &CsvProblem::LineTooLong { bytes }));
+                }
+                Err(LineProblem::Gzip(error)) => {
+                    return Err(self.problem(Some(lines.number()), &CsvProblem::Gzip { why: error.to_string() }));
+                }
+                Err(LineProblem::Read(error)) => {
+                    return Err(self.problem(Some(lines.number()), &CsvProblem::Read { why: error.to_string() }));
+                }
+            }
+            let Some(comment) = lines.line().strip_prefix(b"#") else { break };
+            let comment = String::from_utf8_lossy(comment);
+            if let Some((key, value)) = comment.split_once('=').map(|(key, value)| (key.trim(), value.trim()))
+                && !key.is_empty()
+            {
+                self.metadata.push((key.to_owned(), value.to_owned()));
+            }
+        }
+        let number = lines.number();
+        let names = cells::complete_row(lines).and_then(|()| cells::row_text(lines));
+        let names = names.map_err(|what| {
+            refusal(&self.path, Some(Place::Line(number)), what, "is this a CSV file? save it as UTF-8 text")
+        })?;
+        let names: Vec<String> = Split::all(names).map(Cow::into_owned).collect();
+        let names_as_text: Vec<&str> = names.iter().map(String::as_str).collect();
+        super::check_names(&names_as_text).map_err(|problem| self.problem(Some(lines.number()), &problem))?;
+        Ok(names)
+    }
+
+    fn problem(&self, line: Option<u64>, problem: &CsvProblem) -> StreamError {
+        let text = problem.to_string();
+        let (what, remedy) = text.split_once("; ").unwrap_or((&text, "write a CSV file with a header"));
+        refusal(&self.path, line.map(Place::Line), what, remedy)
+    }
+}
+
+/// Columns with a name each that no other has, and what had to be done for it.
+fn distinct(names: Vec<String>) -> (Vec<TableColumn>, Vec<String>) {
+    let mut taken: std::collections::HashSet<String> = names.iter().cloned().collect();
+    let mut seen = std::collections::HashSet::new();
+    let mut findings = Vec::new();
+    let mut columns = Vec::with_capacity(names.len());
+    for (place, name) in names.into_iter().enumerate() {
+        let wanted = if name.is_empty() { format!("column_{}", place + 1) } else { name.clone() };
+        let mut unique = wanted.clone();
+        let mut copy = 2;
+        while seen.contains(&unique) || (unique != name && taken.contains(&unique)) {
+            unique = format!("{wanted}_copy{copy}");
+            copy += 1;
+        }
+        if unique != name {
+            findings.push(format!("column {} `{}` was named `{}`", place + 1, name.escape_debug(), unique.escape_debug()));
+        }
+        seen.insert(unique.clone());
+        taken.insert(unique.clone());
+        columns.push(TableColumn::number(unique));
+    }
+    (columns, findings)
+}

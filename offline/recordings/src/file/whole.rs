@@ -1,0 +1,46 @@
+//! A file that appears whole or not at all.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::Path;
+
+use crate::aside::Aside;
+
+const BUFFER_BYTES: usize = 1 << 18;
+
+/// A file being written beside its final name; [`WholeFile::finish`] renames it, dropping it before removes it.
+#[derive(Debug)]
+pub(crate) struct WholeFile {
+    file: BufWriter<File>,
+    aside: Aside,
+}
+
+impl WholeFile {
+    /// Begins the file.
+    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+        let (aside, file) = Aside::create(path)?;
+        Ok(Self { file: BufWriter::with_capacity(BUFFER_BYTES, file), aside })
+    }
+
+    /// Brings everything to the disk and gives the file its name.
+    pub(crate) fn finish(self) -> io::Result<()> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        self.aside.commit(&file)
+    }
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}

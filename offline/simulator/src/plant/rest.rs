@@ -1,0 +1,50 @@
+//! Where the joints are while the motors stand still.
+
+use super::{Plant, State, Vector};
+
+impl Plant {
+    /// The state at rest with motors at given angles, rad: cables carry gravity, friction and dead bands carry nothing.
+    /// Found by Newton steps on the static balance; play is then settled by the first milliseconds of any run.
+    pub fn at_rest(&mut self, motors: &Vector) -> State {
+        let n = self.joints;
+        let mut state = State { motors: *motors, ..State::ZERO };
+        let mut seen = [0.0; super::JOINTS_MAX];
+        for i in 0..n {
+            seen[i] = motors[i] / self.drives[i].nominal.ratio;
+        }
+        for i in 0..n {
+            state.joints[i] = (0..n).map(|k| self.coupling_inverse[i][k] * seen[k]).sum();
+        }
+        let Some(coupling_inverse) = super::inverse(&self.coupling, n) else { return state };
+        let mut gravity = [0.0; super::JOINTS_MAX];
+        for _ in 0..50 {
+            self.body.gravity(&mut self.workspace, &state.joints[..n], &mut gravity[..n]);
+            let external = self.external(&state);
+            // Torque that each cable must carry, and the deflection at which it does, from the present slope.
+            let found = self.deflections(&state);
+            let mut missing = [0.0; super::JOINTS_MAX];
+            for i in 0..n {
+                let carried: f64 = (0..n).map(|k| coupling_inverse[k][i] * (gravity[k] - external[k])).sum();
+                let drive = &self.drives[i];
+                let cable = drive.elastic(found.deflection[i], 0.0, &state.memories);
+                let wanted = carried - cable.torque;
+                // Inside a dead band the cable has a slope but no torque: step out of it.
+                missing[i] = wanted / cable.stiffness.max(1e-9);
+                if cable.torque == 0.0 && wanted != 0.0 {
+                    let play: f64 = super::on(&drive.backlash).map(|backlash| backlash.b).sum();
+                    missing[i] += wanted.signum() * (play / 2.0 - found.deflection[i].abs()).max(0.0);
+                }
+            }
+            let mut largest = 0.0_f64;
+            for i in 0..n {
+                let step: f64 = (0..n).map(|k| coupling_inverse[i][k] * missing[k]).sum();
+                state.joints[i] -= step;
+                largest = largest.max(step.abs());
+            }
+            if largest < 1e-14 {
+                break;
+            }
+        }
+        state
+    }
+}

@@ -1,0 +1,183 @@
+//! Whole runs: homing, a trajectory, full states at 1 kHz with their truth. Every run depends on its own number and seed only,
+//! so any number of threads makes the same files.
+
+use arm::{Arm, Joints, Side};
+use ravenpose_wire::RavenState;
+use recordings::sample::{self, Cycle};
+use recordings::stream::{Record, Truth};
+
+use crate::model::Robot;
+use crate::plant::PlantError;
+use crate::random::Random;
+use crate::simulation::{Command, CycleOfArm, Simulation};
+use crate::trajectory::{Trajectory, WORKSPACE, teleoperation, zigzag};
+
+/// Wall clock of the first sample of the first run, s since 1970; runs follow each other an hour apart.
+const EPOCH_S: i64 = 1_700_000_000;
+/// How long cables settle before the first sample, s.
+const SETTLE_S: f64 = 2.0;
+
+/// Which motion a run has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// Reaches as in teleoperation.
+    Teleoperation,
+    /// Rows back and forth.
+    Zigzag,
+    /// Three runs of teleoperation, then one of zig-zag.
+    Mixed,
+}
+
+/// What to make.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The robot; each run homes it anew.
+    pub robot: Robot,
+    /// Connected arms.
+    pub sides: Vec<Side>,
+    /// Length of all runs together, s.
+    pub duration_s: f64,
+    /// Longest run, s.
+    pub run_s: f64,
+    /// Everything follows from it.
+    pub seed: u64,
+    /// What the arms do.
+    pub motion: Motion,
+}
+
+/// One run of a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Run {
+    /// From 0.
+    pub index: usize,
+    /// Seed of homing and motion.
+    pub seed: u64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Is it a zig-zag?
+    pub zigzag: bool,
+}
+
+impl Plan {
+    /// Its runs, of equal length.
+    pub fn runs(&self) -> Vec<Run> {
+        let count = (self.duration_s / self.run_s - 1e-9).ceil().max(1.0) as usize;
+        let mut random = Random::new(self.seed, 4);
+        (0..count)
+            .map(|index| Run {
+                index,
+                seed: (random.share() * (1_u64 << 53) as f64) as u64,
+                duration_s: self.duration_s / count as f64,
+                zigzag: match self.motion {
+                    Motion::Teleoperation => false,
+                    Motion::Zigzag => true,
+                    Motion::Mixed => index % 4 == 3,
+                },
+            })
+            .collect()
+    }
+}
+
+impl Run {
+    /// Number of control cycles.
+    pub fn cycles(&self) -> u64 {
+        (self.duration_s * 1e3).round() as u64
+    }
+}
+
+/// One arm in a run.
+struct Playing {
+    arm: Arm,
+    simulation: Simulation,
+    trajectory: Trajectory,
+}
+
+/// A run being made, cycle by cycle.
+pub struct Player {
+    run: Run,
+    arms: Vec<Playing>,
+    cycle: u64,
+}
+
+impl Player {
+    /// Homes the robot and lets it settle at the start of the trajectory.
+    ///
+    /// # Errors
+    /// [`PlantError`] for effects that cannot be where they are.
+    pub fn new(plan: &Plan, run: Run) -> Result<Self, PlantError> {
+        let arms = plan.sides.iter().map(|side| playing(&plan.robot, *side, run)).collect::<Result<_, _>>()?;
+        Ok(Self { run, arms, cycle: 0 })
+    }
+
+    /// The next cycle: the state, and where each arm truly is, in the order of the plan's arms; none at the end of the run.
+    pub fn next_cycle(&mut self) -> Option<(RavenState, Vec<(Side, CycleOfArm)>)> {
+        if self.cycle == self.run.cycles() {
+            return None;
+        }
+        let period_ns = 1_000_000;
+        let since_start_ns = self.cycle as i64 * period_ns;
+        let stamp_ns = self.start_ns() + since_start_ns;
+        let mut state = sample::state_of(&Cycle { index: self.cycle, since_start_ns, stamp_ns, dt_ns: period_ns });
+        let time_s = self.cycle as f64 * 1e-3;
+        let cycles = self
+            .arms
+            .iter_mut()
+            .map(|playing| {
+                let cycle = playing.simulation.tick(&Command::Joints(playing.trajectory.at(time_s)));
+                sample::put(&mut state, &playing.arm, &cycle.reported);
+                (playing.arm.side, cycle)
+            })
+            .collect();
+        self.cycle += 1;
+        Some((state, cycles))
+    }
+
+    /// Gives every record of the run, in order, to `take`: a state, then the truth of each arm.
+    ///
+    /// # Errors
+    /// Whatever `take` refuses.
+    pub fn records<E>(&mut self, mut take: impl FnMut(&Record) -> Result<(), E>) -> Result<(), E> {
+        let start_ns = self.start_ns();
+        while let Some((state, cycles)) = self.next_cycle() {
+            let time_ns = start_ns + state.source_time_ns;
+            take(&Record::State(Box::new(state)))?;
+            for (side, cycle) in &cycles {
+                take(&Record::Truth(truth(time_ns, *side, cycle)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Offset that homing left on an arm, rad and m.
+    pub fn homing_offset(&self, side: Side) -> Option<&Joints> {
+        self.arms.iter().find(|playing| playing.arm.side == side).map(|playing| playing.simulation.homing_offset())
+    }
+
+    fn start_ns(&self) -> i64 {
+        (EPOCH_S + 3600 * self.run.index as i64) * 1_000_000_000
+    }
+}
+
+fn playing(robot: &Robot, side: Side, run: Run) -> Result<Playing, PlantError> {
+    let arm = robot.raven.arm(side);
+    let seed = run.seed ^ (side.index() as u64) << 40;
+    let mut random = Random::new(seed, 5);
+    let start: Joints = WORKSPACE.map(|(low, high)| random.between(low + 0.3 * (high - low), high - 0.3 * (high - low)));
+    let make = if run.zigzag { zigzag } else { teleoperation };
+    let trajectory = make(seed, start, &WORKSPACE, run.duration_s);
+    let mut simulation = Simulation::new(robot, side, seed, &start)?;
+    simulation.settle(&start, SETTLE_S);
+    Ok(Playing { arm, simulation, trajectory })
+}
+
+fn truth(time_ns: i64, side: Side, cycle: &CycleOfArm) -> Truth {
+    let (t, q) = (&cycle.truth.tip.translation.vector, cycle.truth.tip.rotation.quaternion());
+    Truth {
+        time_ns,
+        side,
+        position_m: [t.x, t.y, t.z],
+        quaternion_wxyz: [q.w, q.i, q.j, q.k],
+        joints: cycle.truth.joints,
+        cable_force_n: cycle.truth.cable_force_n,
+    }
+}
