@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci faults lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-offline worn faults lint clean
 
 all: build offline examples
 
@@ -43,6 +43,7 @@ install:
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' bridge/pkgconfig/ravenpose.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/ravenpose.pc
 	install -m 644 bridge/cmake/ravenposeConfig.cmake $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/
 	sed -e 's|@VERSION@|$(VERSION)|' bridge/cmake/ravenposeConfigVersion.cmake.in > $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/ravenposeConfigVersion.cmake
+	install -m 644 models/raven2-plant.toml models/raven2-worn.toml models/raven2-uiuc-fit.toml models/gap-vocabulary.json $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
 
@@ -81,8 +82,16 @@ faults: build
 bench-ci: build
 	target/release/ravenpose-bench ci
 
-bench: build
+bench: build bench-offline
 	target/release/ravenpose-bench full
+
+# Simulator and recordings: times real time, MB/s, peak memory.
+bench-offline: offline
+	$(PYTHON3) bench/offline.py
+
+# How far the shipped robots are off, over twenty homings.
+worn: offline
+	target/release/examples/worn
 
 lint:
 	$(CARGO) fmt --all --check

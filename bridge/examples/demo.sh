@@ -37,11 +37,18 @@ elif [ -f "$recording" ]; then
   run=$recording
   echo "recording: $run (real RAVEN-II, 3 motors)"
 else
-  run=synthetic:20
-  echo "no recording at hand: a synthetic one of 20 s (make demo RUN=FILE for your own)"
+  echo "no recording at hand: a simulated arm, worn as the paper's was, 20 s (make demo RUN=FILE for your own)"
+  $bin/ravenpose simulate --robot raven2-worn --minutes 0.3333333 --seed 1 --out "$work/simulated" | sed 's/^/  /'
+  [ "${PIPESTATUS[0]}" -eq 0 ] || exit 2
+  run=$work/simulated/run_0001.mcap
 fi
 $bin/ravenpose convert "$run" "$work/run.rvs" | sed 's/^/  /'
 [ "${PIPESTATUS[0]}" -eq 0 ] || exit 2
+# Where the recording knows it, the true tip is shown beside the corrected one.
+truth=
+if $bin/ravenpose convert "$run" "$work/truth.csv" > /dev/null 2>&1 && grep -m1 -q '^t_s.*truth_x_mm.*truth_z_mm' "$work/truth.csv"; then
+  truth="--truth $work/truth.csv"
+fi
 
 cores=$(nproc)
 if [ "$cores" -ge 2 ]; then robot_core=0; service_core=1; else robot_core=0; service_core=0; fi
@@ -70,7 +77,8 @@ for _ in $(seq 1 100); do
   kill -0 $service 2>/dev/null || { cat "$work/service.log" >&2; exit 2; }
   sleep 0.05
 done
-$bin/demo_client "$work/run.rvs" --core $robot_core > "$work/client.log" 2>&1 & client=$!
+# shellcheck disable=SC2086
+$bin/demo_client "$work/run.rvs" --core $robot_core $truth > "$work/client.log" 2>&1 & client=$!
 sleep 0.3
 echo "playing at 1 kHz: stand-in on core $robot_core, service on core $service_core ..."
 $bin/standin "$work/run.rvs" --seconds 20 --core $robot_core --priority 90 --wait-readers 1 > "$work/standin.log" 2>&1 & standin=$!

@@ -114,8 +114,8 @@ def compare(folder):
                 assert ours.shape == theirs.shape, (text.name, name, ours.shape, theirs.shape)
                 size = 1.0 if name == "vector_qdd" else max(1.0, np.abs(theirs).max())
                 deviation = float(np.abs(ours - theirs).max() / size)
-                # Written so that NaN wins.
-                if name not in worst or not deviation <= worst[name][0]:
+                # What is no number is worst, and stays it.
+                if name not in worst or np.isnan(deviation) or deviation > worst[name][0]:
                     worst[name] = (deviation, text.name)
             states += 1
     return worst, arms, states

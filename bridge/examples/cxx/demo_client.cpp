@@ -1,12 +1,14 @@
 // The client of `make demo`: takes every pose, checks each field against the replayed file, and prints what it saw.
 //
-// usage: demo_client FILE [--core N]
+// usage: demo_client FILE [--core N] [--truth TABLE.csv]
+// TABLE.csv is a tidy table of the gold arm with truth_x_mm, truth_y_mm, truth_z_mm, a row per state: where the tip really was.
 // Ends when the poses have been stale for half a second, or on SIGTERM. Exit status 1 if a message was lost without being counted,
 // came out of order, or had a wrong field.
 #include <sched.h>
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -14,6 +16,7 @@
 #include <cstring>
 #include <fstream>
 #include <ravenpose.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -39,6 +42,38 @@ void row(const char *name, std::vector<int64_t> &values) {
               quantile(values, 1.0));
 }
 
+using Point = std::array<double, 3>;
+
+// True positions in um, row by row; empty if the table has none.
+std::vector<Point> true_positions(const std::string &path) {
+  std::ifstream file(path);
+  std::vector<Point> found;
+  std::string line, cell;
+  std::array<int, 3> column{-1, -1, -1};
+  bool header = false;
+  while (std::getline(file, line)) {
+    if (line.empty() || line[0] == '#') continue;
+    std::stringstream cells(line);
+    Point point{NAN, NAN, NAN};
+    for (int index = 0; std::getline(cells, cell, ','); ++index) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        if (!header && cell == std::string("truth_") + "xyz"[axis] + "_mm") column[axis] = index;
+        if (header && index == column[axis] && !cell.empty()) point[axis] = std::strtod(cell.c_str(), nullptr) * 1000.0;
+      }
+    }
+    if (header) found.push_back(point);
+    header = true;
+  }
+  if (column[0] < 0 || column[1] < 0 || column[2] < 0) found.clear();
+  return found;
+}
+
+double distance2(const double *position, const Point &truth) {
+  double sum = 0;
+  for (size_t axis = 0; axis < 3; ++axis) sum += (position[axis] - truth[axis]) * (position[axis] - truth[axis]);
+  return sum;
+}
+
 // Does the pose carry what the file says for this state?
 bool right(const ravenpose_pose &pose, const ravenpose_state &state) {
   for (uint32_t arm = 0; arm < 2; ++arm) {
@@ -57,10 +92,11 @@ bool right(const ravenpose_pose &pose, const ravenpose_state &state) {
 }  // namespace
 
 int main(int argc, char **argv) try {
-  std::string path;
+  std::string path, truth_path;
   int core = -1;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--core" && i + 1 < argc) core = std::atoi(argv[++i]);
+    else if (std::string(argv[i]) == "--truth" && i + 1 < argc) truth_path = argv[++i];
     else path = argv[i];
   }
   std::ifstream file(path, std::ios::binary);
@@ -71,6 +107,14 @@ int main(int argc, char **argv) try {
   }
   std::vector<ravenpose_state> states((bytes.size() - 64) / sizeof(ravenpose_state));
   std::memcpy(states.data(), bytes.data() + 64, states.size() * sizeof(ravenpose_state));
+
+  std::vector<Point> truth;
+  if (!truth_path.empty() && (truth = true_positions(truth_path)).empty()) {
+    std::fprintf(stderr, "demo_client: %s: no truth_x_mm, truth_y_mm, truth_z_mm in it\n", truth_path.c_str());
+    return 2;
+  }
+  double raw_sum2 = 0, corrected_sum2 = 0, raw_largest2 = 0;
+  uint64_t compared = 0;
 
   struct sigaction action {};
   action.sa_handler = [](int) { stop = 1; };
@@ -129,6 +173,14 @@ int main(int argc, char **argv) try {
     in_service.push_back(pose->publish_time_ns - pose->start_time_ns);
     to_client.push_back(now - pose->publish_time_ns);
     whole.push_back(pose->publish_time_ns - pose->source_time_ns);
+    const ravenpose_arm_pose &gold = pose->arm[0];
+    if (gold.status == RAVENPOSE_STATUS_VALID && last_source <= truth.size() && std::isfinite(truth[last_source - 1][0])) {
+      const double raw2 = distance2(gold.raw_position_um, truth[last_source - 1]);
+      raw_sum2 += raw2;
+      raw_largest2 = std::max(raw_largest2, raw2);
+      corrected_sum2 += distance2(gold.corrected_position_um, truth[last_source - 1]);
+      ++compared;
+    }
     for (uint32_t arm = 0; arm < 2; ++arm) {
       const ravenpose_arm_pose &out = pose->arm[arm];
       if (out.status == RAVENPOSE_STATUS_ABSENT) continue;
@@ -168,6 +220,14 @@ int main(int argc, char **argv) try {
     const ravenpose_arm_pose &out = last.arm[arm];
     std::printf("         last: raw %.1f %.1f %.1f um, corrected %.1f %.1f %.1f um\n", out.raw_position_um[0], out.raw_position_um[1],
                 out.raw_position_um[2], out.corrected_position_um[0], out.corrected_position_um[1], out.corrected_position_um[2]);
+  }
+  if (compared > 0) {
+    const double n = static_cast<double>(compared);
+    std::printf("  gold arm against its true tip, %llu valid poses: raw off by %.3f mm RMS, %.3f mm at most; corrected off by %.3f mm RMS\n",
+                (unsigned long long)compared, std::sqrt(raw_sum2 / n) / 1000.0, std::sqrt(raw_largest2) / 1000.0,
+                std::sqrt(corrected_sum2 / n) / 1000.0);
+  } else if (!truth.empty()) {
+    std::printf("  gold arm against its true tip: no valid pose to compare\n");
   }
   if (answered == 0) std::fprintf(stderr, "demo_client: no pose came\n");
   return answered == 0 || unaccounted != 0 || overflowed != 0 || reordered != 0 || wrong != 0 ? 1 : 0;

@@ -32,7 +32,8 @@ pub enum InverseError {
     NotAPose,
     /// No posture of the first two axes points at any wrist point of this pose.
     #[error(
-        "inverse kinematics: out of reach, the wrist lies {degrees:.3} degrees beyond what shoulder and elbow can point at; move or turn the tip"
+        "inverse kinematics: out of reach, the wrist lies {degrees:.3} degrees beyond what shoulder and elbow can point at; \
+         move or turn the tip"
     )]
     Unreachable {
         /// Least angle by which the direction of axis 3 is missed, degrees.
@@ -43,7 +44,8 @@ pub enum InverseError {
     Degenerate(Degeneracy),
     /// The plant file describes another kind of arm.
     #[error(
-        "inverse kinematics: axes 1 to 3 and 4 to 5 of this plant file do not meet in a point, or axes 4 to 6 are not at right angles; only such arms have this closed form"
+        "inverse kinematics: axes 1 to 3 and 4 to 5 of this plant file do not meet in a point, or axes 4 to 6 are not at right \
+         angles; only such arms have this closed form"
     )]
     OtherGeometry,
 }

@@ -72,10 +72,10 @@ fn gravity_is_the_gradient_of_potential_energy() {
         let q = motion(random, n).q;
         let mut g = vec![0.0; n];
         arm.gravity(&mut ws, &q, &mut g);
-        for k in 0..n {
+        for (k, g) in g.iter().enumerate() {
             let h = 1e-4;
             let rise = arm.potential_energy(&mut ws, &shifted(&q, k, h)) - arm.potential_energy(&mut ws, &shifted(&q, k, -h));
-            worst.see((g[k] - rise / (2.0 * h)) / 100.0);
+            worst.see((g - rise / (2.0 * h)) / 100.0);
         }
     });
     println!("gravity and potential energy: {:e} of 100 N m", worst.0);

@@ -137,7 +137,8 @@ fn difference(a: &SerialArm, b: &SerialArm) -> f64 {
 #[test]
 fn fixed_joints_are_merged_into_the_chain() {
     let fixed = r#"<joint name="plate" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0 0 1" rpy="0 0 1.5"/></joint>
-      <link name="d"><inertial><origin xyz="0.5 0 0"/><mass value="3"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+      <link name="d"><inertial><origin xyz="0.5 0 0"/><mass value="3"/>
+        <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
       <joint name="end" type="fixed"><parent link="d"/><child link="e"/><origin xyz="0 0.1 0"/></joint><link name="e"/>"#;
     let loaded = load(&with(fixed));
     let last = loaded.arm.link_inertia(2);
@@ -160,7 +161,8 @@ fn fixed_joints_are_merged_into_the_chain() {
 #[test]
 fn a_fixed_mount_turns_gravity_and_moves_no_frame() {
     let mounted = with(
-        r#"<link name="floor"/><joint name="mount" type="fixed"><parent link="floor"/><child link="base"/><origin xyz="1 2 3" rpy="3.141592653589793 0 0"/></joint>"#,
+        r#"<link name="floor"/><joint name="mount" type="fixed"><parent link="floor"/><child link="base"/>
+          <origin xyz="1 2 3" rpy="3.141592653589793 0 0"/></joint>"#,
     );
     let loaded = load(&mounted);
     assert_eq!((loaded.root.as_str(), loaded.arm.base_name()), ("floor", "base"));
@@ -195,9 +197,11 @@ fn what_is_assumed_is_noted() {
 
 #[test]
 fn transmissions_of_every_age_are_read() {
-    let new = r#"<transmission name="t1"><type>transmission_interface/SimpleTransmission</type><joint name="one"><hardwareInterface>x</hardwareInterface><offset>0.25</offset></joint>
+    let new = r#"<transmission name="t1"><type>transmission_interface/SimpleTransmission</type>
+      <joint name="one"><hardwareInterface>x</hardwareInterface><offset>0.25</offset></joint>
       <actuator name="m1"><mechanicalReduction> -12.5 </mechanicalReduction></actuator></transmission>"#;
-    let old = r#"<transmission type="pr2_mechanism_model/SimpleTransmission" name="t2"><actuator name="m2"/><joint name="two"/><mechanicalReduction>7</mechanicalReduction></transmission>"#;
+    let old = r#"<transmission type="pr2_mechanism_model/SimpleTransmission" name="t2">
+      <actuator name="m2"/><joint name="two"/><mechanicalReduction>7</mechanicalReduction></transmission>"#;
     let bare = r#"<transmission name="t3"><type>SimpleTransmission</type><joint name="three"/></transmission>"#;
     let loaded = load(&with(&format!("{new}{old}{bare}")));
     let [one, two, three] = &loaded.drives[..] else { panic!("three drives") };

@@ -23,7 +23,7 @@ fn transmissions_that_couple_joints_are_refused_by_name() {
     let differential =
         refused(&one("transmission_interface/DifferentialTransmission", r#"<joint name="one"/><joint name="two"/>"#));
     assert!(
-        differential.contains("line 9, transmission t: it is transmission_interface/DifferentialTransmission"),
+        differential.contains("line 13, transmission t: it is transmission_interface/DifferentialTransmission"),
         "{differential}"
     );
     assert!(refused(&one(simple, r#"<joint name="one"/><joint name="two"/>"#)).contains("2 joints and 0 actuators"));
@@ -65,9 +65,9 @@ fn a_branch_is_refused_unless_the_tip_is_named() {
 fn joints_and_trees_that_are_no_serial_arm_are_refused_by_name() {
     for kind in ["floating", "planar", "spherical", "hinge"] {
         let text = with("").replace(r#"name="two" type="continuous""#, &format!("name=\"two\" type=\"{kind}\""));
-        assert!(refused(&text).contains(&format!("line 7, joint two: {kind} joints cannot be represented")));
+        assert!(refused(&text).contains(&format!("line 10, joint two: {kind} joints cannot be represented")));
     }
-    assert!(refused(&with(r#"<link name="a"/>"#)).contains("line 9: there is a link a already"));
+    assert!(refused(&with(r#"<link name="a"/>"#)).contains("line 13: there is a link a already"));
     assert!(refused(&with("").replace(r#"name="two""#, r#"name="one""#)).contains("there is a joint one already"));
     assert!(refused(&with("").replace(r#"child link="c""#, r#"child link="z""#)).contains("joint three: there is no link `z`"));
     assert!(refused(&with("").replace(r#"child link="c""#, r#"child link="b""#)).contains("link `b` already hangs on joint `two`"));
@@ -86,7 +86,7 @@ fn wrong_numbers_are_refused_with_line_and_element() {
         assert!(ARM.contains(from), "{from}");
         refused(&with("").replacen(from, to, 1))
     };
-    assert!(changed(r#"xyz="0 0 0.3""#, r#"xyz="0 0 0.3 junk""#).contains("line 7, joint two: xyz of <origin> is `0 0 0.3 junk`"));
+    assert!(changed(r#"xyz="0 0 0.3""#, r#"xyz="0 0 0.3 junk""#).contains("line 10, joint two: xyz of <origin> is `0 0 0.3 junk`"));
     assert!(changed(r#"xyz="0 0 0.3""#, r#"xyz="0 nan 0.3""#).contains("expected three finite numbers"));
     assert!(changed(r#"rpy="1 2 3""#, r#"rpy="1 2""#).contains("rpy of <origin>"));
     assert!(changed(r#"rpy="1 2 3""#, r#"rpy="1 2 3" quat_xyzw="0 0 0 1""#).contains("both rpy and quat_xyzw"));
@@ -100,7 +100,7 @@ fn wrong_numbers_are_refused_with_line_and_element() {
     assert!(changed(r#"velocity="3""#, r#"velocity="-3""#).contains("velocity is negative"));
     assert!(changed(r#"<parent link="a"/>"#, "").contains("joint two: <parent> is missing"));
     assert!(changed(r#" type="continuous""#, "").contains("joint two: attribute `type` of <joint> is missing"));
-    assert!(changed(r#"<link name="b"/>"#, "<link/>").contains("line 4, link: attribute `name` of <link> is missing"));
+    assert!(changed(r#"<link name="b"/>"#, "<link/>").contains("line 5, link: attribute `name` of <link> is missing"));
     assert!(changed(r#"<origin xyz="0 0 0.1"/>"#, r#"<origin xyz="0 0 0.1"/><origin/>"#).contains("a second <origin>"));
     assert!(changed("</robot>", "").contains("not well-formed XML"));
 }

@@ -1,40 +1,144 @@
-//! `ravenpose convert`: recordings to the state file that the stand-in replays.
+//! `ravenpose convert`: a recording of any format into any other.
 
-use recordings::states::{self, Arms, States};
-use recordings::{csv, statefile, synthetic};
+use crate::progress::Progress;
+use arm::Side;
+use recordings::open::{Opened, open};
+use recordings::save::{self, StateFormat, TableFormat};
+use recordings::states::{self, Arms};
+use recordings::stream::{Damage, Record, Source, Truth};
+use recordings::table::{self, TableSource};
+use recordings::tidy::{self, StateTable};
+use recordings::{Recording, csv};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Seed of the generated recording; stated here so that everybody gets the same.
-const SYNTHETIC_SEED: u64 = 1;
+/// A damaged input was converted as far as it goes.
+const PARTLY: u8 = 1;
 
-pub(crate) fn run(input: &str, out: &Path, arm: &str) -> Result<ExitCode, String> {
-    if out.extension().is_none_or(|extension| extension != "rvs") {
-        return Err(format!("{}: only state files (.rvs) can be written by this version; name the output OUT.rvs", out.display()));
+const OUTPUTS: &str = ".mcap, .bag, .rvs, .txt (235 columns), .252.csv, .csv, .csv.gz or .parquet";
+
+pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>) -> Result<ExitCode, String> {
+    if same_file(input, out) {
+        return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
-    let arms = match arm {
+    let states = StateFormat::of_name(out);
+    let tables = TableFormat::of_name(out);
+    let arms = arm.map(arms_of);
+    let damage = match (open(input).map_err(|error| error.to_string())?, states, tables) {
+        (Opened::States(source), Some(format), _) => states_to_states(input, source, out, format)?,
+        (Opened::States(source), None, Some(format)) => states_to_table(source, out, format, arms)?,
+        (Opened::Table(source), _, Some(format)) => table_to_table(source, out, format)?,
+        (Opened::Table(_), Some(format), None) => {
+            table_to_states(input, out, format, arms.unwrap_or(Arms::Gold))?;
+            None
+        }
+        (_, None, None) => return Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
+    };
+    let Some(damage) = damage else { return Ok(ExitCode::SUCCESS) };
+    eprintln!(
+        "ravenpose: {}: {}: {}; what stands before it was converted, the rest is lost",
+        input.display(),
+        damage.place,
+        damage.what
+    );
+    Ok(ExitCode::from(PARTLY))
+}
+
+fn arms_of(name: &str) -> Arms {
+    match name {
         "green" => Arms::Green,
         "both" => Arms::Both,
         _ => Arms::Gold,
-    };
-    let made = match input.strip_prefix("synthetic:") {
-        Some(seconds) => generated(seconds, arms)?,
-        None => recorded(input, arms)?,
-    };
-    for note in &made.notes {
-        println!("note: {note}");
     }
-    statefile::write(out, &made.states, statefile::PERIOD_NS).map_err(|error| error.to_string())?;
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+fn note_all(losses: &[&str]) {
+    losses.iter().for_each(|loss| println!("note: {loss}"));
+}
+
+fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, format: StateFormat) -> Result<Option<Damage>, String> {
+    note_all(format.losses());
+    let metadata = source.metadata().to_vec();
+    let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
+    let mut progress = Progress::bytes();
+    let records = save::copy_states(source.as_mut(), sink.as_mut(), &mut |done, total| progress.at(done, total));
+    progress.end();
+    let records = records.map_err(|error| error.to_string())?;
+    if records == 0 {
+        let why = source.damage().map_or_else(|| "it holds no state".to_owned(), |damage| format!("{}: {}", damage.place, damage.what));
+        return Err(format!("{}: {why}; nothing was written", input.display()));
+    }
+    sink.finish().map_err(|error| error.to_string())?;
+    println!("{}: {records} records", out.display());
+    Ok(source.damage().cloned())
+}
+
+fn states_to_table(source: Box<dyn Source>, out: &Path, format: TableFormat, arms: Option<Arms>) -> Result<Option<Damage>, String> {
+    note_all(format.losses_of_states());
+    let table = StateTable::new(source, tidy::Options { arms, all_truth: false }).map_err(|error| error.to_string())?;
+    table_to_table(Box::new(table), out, format)
+}
+
+fn table_to_table(mut source: Box<dyn TableSource>, out: &Path, format: TableFormat) -> Result<Option<Damage>, String> {
+    let metadata = source.metadata().to_vec();
+    let columns = source.columns().to_vec();
+    let mut sink = save::create_table(out, format, &columns, &metadata).map_err(|error| error.to_string())?;
+    let mut progress = Progress::bytes();
+    let rows = table::copy(source.as_mut(), sink.as_mut(), &mut |done, total| progress.at(done, total));
+    progress.end();
+    let rows = rows.map_err(|error| error.to_string())?;
+    sink.finish().map_err(|error| error.to_string())?;
+    println!("{}: {rows} rows, {} columns", out.display(), columns.len());
+    Ok(source.damage().cloned())
+}
+
+/// Full states need a time that rises, joints or motors: the strict reader refuses what lacks them.
+fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) -> Result<(), String> {
+    let recording = strict(input)?;
+    let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
+    made.notes.iter().for_each(|note| println!("note: {note}"));
+    note_all(format.losses());
+    let metadata: Vec<(String, String)> = recording.metadata.clone().into_iter().collect();
+    let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
+    let keeps_truth = format != StateFormat::StateFile && format != StateFormat::Columns235;
+    let side = if arms == Arms::Green { Side::Green } else { Side::Gold };
+    for (row, state) in made.states.iter().enumerate() {
+        let record = Record::State(Box::new(*state));
+        let time_ns = record.time_ns();
+        sink.write(&record).map_err(|error| error.to_string())?;
+        if let Some(truth) = truth(&recording, row, time_ns, side).filter(|_| keeps_truth) {
+            sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
+        }
+    }
+    sink.finish().map_err(|error| error.to_string())?;
     println!("{}: {} states, {:.3} s", out.display(), made.states.len(), made.states.len() as f64 * 1e-3);
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
-fn generated(seconds: &str, arms: Arms) -> Result<States, String> {
-    let seconds: f64 = seconds.parse().map_err(|_| format!("synthetic:{seconds}: not a number of seconds; write synthetic:20"))?;
-    synthetic::states(SYNTHETIC_SEED, seconds, arms).map_err(|error| error.to_string())
+fn strict(input: &Path) -> Result<Recording, String> {
+    let name = input.to_string_lossy();
+    if name.ends_with(".csv") || name.ends_with(".csv.gz") {
+        return csv::read(input).map_err(|error| error.to_string());
+    }
+    match open(input).map_err(|error| error.to_string())? {
+        Opened::Table(mut source) => table::collect(&name, source.as_mut()).map_err(|error| error.to_string()),
+        Opened::States(_) => Err(format!("{name}: is a recording of states")),
+    }
 }
 
-fn recorded(input: &str, arms: Arms) -> Result<States, String> {
-    let recording = csv::read(Path::new(input)).map_err(|error| error.to_string())?;
-    states::from_recording(&recording, arms).map_err(|error| error.to_string())
+/// What the row says of where the arm truly was; none where it says nothing.
+fn truth(recording: &Recording, row: usize, time_ns: i64, side: Side) -> Option<Truth> {
+    let cell = |name: &str| recording.column(name).map_or(f64::NAN, |values| values[row]);
+    let mut truth = Truth::unknown(time_ns, side);
+    truth.position_m = ["truth_x_m", "truth_y_m", "truth_z_m"].map(cell);
+    for joint in 0..arm::JOINTS {
+        let unit = if joint == 2 { "m" } else { "rad" };
+        truth.joints[joint] = cell(&format!("truth_jpos_{}_{unit}", joint + 1));
+    }
+    let known = truth.position_m.iter().chain(&truth.joints).any(|value| value.is_finite());
+    known.then_some(truth)
 }

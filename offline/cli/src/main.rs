@@ -3,7 +3,12 @@
 mod check;
 mod convert;
 mod infer;
+mod info;
 mod output;
+mod plot;
+mod progress;
+mod record;
+mod simulate;
 mod stats;
 
 use clap::{Parser, Subcommand};
@@ -34,15 +39,71 @@ enum Command {
         #[arg(long, default_value = "f32")]
         weights: String,
     },
-    /// Turn a recording into a file of full states that a stand-in replays (OUT ends in .rvs)
+    /// Turn a recording of any format into another one; the endings say which
     Convert {
-        /// Recording (tidy CSV, also .csv.gz), or `synthetic:SECONDS` for a generated one
-        input: String,
-        /// State file to write
+        /// MCAP, rosbag v1, 252-column CSV, 235-column text, tidy CSV, Parquet, state file
+        input: PathBuf,
+        /// .mcap, .bag, .rvs, .txt (235 columns), .252.csv, .csv, .csv.gz, .parquet
         out: PathBuf,
-        /// Arm that the recording belongs to
+        /// Arm that a table belongs to, or arms of states that a table shall show
+        #[arg(long, value_parser = ["gold", "green", "both"])]
+        arm: Option<String>,
+    },
+    /// What is in a recording: channels, rates, gaps, duplicates, saturation, standstill, damage
+    Info {
+        /// Recordings of any format
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// An overview of a run: commanded, reported, true; error over time, load, direction and posture
+    Plot {
+        /// Recording of any format
+        run: PathBuf,
+        /// Page to write (.html), or the figures alone (.svg)
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Log the running service's states and poses to MCAP, on one clock; a kill loses at most the last second
+    Record {
+        /// File to write; it stands as NAME.part until the end
+        #[arg(long)]
+        out: PathBuf,
+        /// Stop by itself after so many seconds
+        #[arg(long)]
+        seconds: Option<f64>,
+    },
+    /// Runs of a simulated RAVEN-II: full states at 1 kHz and where the arm really was
+    Simulate {
+        /// Length of all runs together
+        #[arg(long)]
+        minutes: f64,
+        /// Everything follows from it
+        #[arg(long)]
+        seed: u64,
+        /// Folder to write run_0001.mcap, ... into
+        #[arg(long)]
+        out: PathBuf,
+        /// Robot or plant file, or raven2-nominal (the default) or raven2-worn
+        #[arg(long)]
+        robot: Option<String>,
+        /// Connected arms
         #[arg(long, default_value = "gold", value_parser = ["gold", "green", "both"])]
         arm: String,
+        /// What they do
+        #[arg(long, default_value = "mixed", value_parser = ["mixed", "teleoperation", "zigzag"])]
+        motion: String,
+        /// Format of the runs
+        #[arg(long, default_value = "mcap", value_parser = ["mcap", "bag", "parquet", "csv", "csv.gz", "252.csv", "txt", "rvs"])]
+        format: String,
+        /// Longest run; each run homes the robot anew
+        #[arg(long, default_value_t = 5.0)]
+        run_minutes: f64,
+        /// Threads; the files do not depend on it
+        #[arg(long)]
+        threads: Option<usize>,
     },
     /// Latency histograms and counters of the running service
     Stats {
@@ -76,7 +137,21 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Infer { model, input, out, weights } => infer::run(&model, &input, &out, &weights),
-        Command::Convert { input, out, arm } => convert::run(&input, &out, &arm),
+        Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
+        Command::Info { files, json } => info::run(&files, json),
+        Command::Plot { run, out } => plot::run(&run, &out),
+        Command::Record { out, seconds } => record::run(&out, seconds),
+        Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => simulate::run(&simulate::Wish {
+            minutes,
+            seed,
+            out: &out,
+            robot: robot.as_deref(),
+            arm: &arm,
+            motion: &motion,
+            format: &format,
+            run_minutes,
+            threads,
+        }),
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };

@@ -64,7 +64,9 @@ impl Page {
             match block {
                 Block::Heading(heading) => section = heading,
                 Block::Figures(figures) => {
-                    all.extend(figures.iter().map(|figure| Figure { title: format!("{section}: {}", figure.title), ..figure.clone() }));
+                    all.extend(
+                        figures.iter().map(|figure| Figure { title: format!("{section}: {}", figure.title), ..figure.clone() }),
+                    );
                 }
                 Block::Responsive(widths) => all.push(widths[0].clone()),
                 _ => {}
@@ -107,7 +109,8 @@ fn write_block(out: &mut String, block: &Block) {
 }
 
 fn figure_block(figure: &Figure) -> String {
-    let caption = if figure.caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>", escape(&figure.caption)) };
+    let caption =
+        if figure.caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>", escape(&figure.caption)) };
     format!("<figure>{}{caption}</figure>", figure::svg(figure))
 }
 
@@ -119,12 +122,11 @@ fn write_table(out: &mut String, words: usize, header: &[String], rows: &[Vec<St
         };
         cells.iter().enumerate().map(cell).collect::<String>()
     };
-    let body: String = rows.iter().map(|row| format!("<tr>{}</tr>", cells("td", row))).collect();
-    let _ = write!(
-        out,
-        "<div class=\"table\"><table><thead><tr>{}</tr></thead><tbody>{body}</tbody></table></div>",
-        cells("th", header)
-    );
+    let _ = write!(out, "<div class=\"table\"><table><thead><tr>{}</tr></thead><tbody>", cells("th", header));
+    for row in rows {
+        let _ = write!(out, "<tr>{}</tr>", cells("td", row));
+    }
+    out.push_str("</tbody></table></div>");
 }
 
 fn style() -> String {

@@ -1,6 +1,6 @@
 //! Figures of an error signal.
 
-use crate::figure::bins::quantile;
+use crate::figure::bins::select;
 
 /// Mean, spread and size of finite values; NaN where there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,15 +30,14 @@ impl Statistics {
         let square = finite.iter().map(|value| value * value).sum::<f64>() / count as f64;
         let variance = finite.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count as f64;
         let mut sizes: Vec<f64> = finite.into_iter().map(f64::abs).collect();
-        sizes.sort_by(f64::total_cmp);
         Self {
             count,
             mean,
             sd: variance.sqrt(),
             rms: square.sqrt(),
-            median: quantile(&sizes, 0.5),
-            p95: quantile(&sizes, 0.95),
-            max: sizes.last().copied().unwrap_or(f64::NAN),
+            median: select(&mut sizes, 0.5),
+            p95: select(&mut sizes, 0.95),
+            max: sizes.into_iter().fold(f64::NAN, f64::max),
         }
     }
 }

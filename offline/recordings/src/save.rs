@@ -114,11 +114,7 @@ const REPORT_EVERY: u64 = 1024;
 ///
 /// # Errors
 /// [`StreamError`] of either side.
-pub fn copy_states(
-    source: &mut dyn Source,
-    sink: &mut dyn Sink,
-    progress: &mut dyn FnMut(u64, u64),
-) -> Result<u64, StreamError> {
+pub fn copy_states(source: &mut dyn Source, sink: &mut dyn Sink, progress: &mut dyn FnMut(u64, u64)) -> Result<u64, StreamError> {
     let mut records = 0_u64;
     while let Some(record) = source.next()? {
         sink.write(&record)?;

@@ -214,7 +214,9 @@ pub fn collect(name: &str, source: &mut dyn TableSource) -> Result<Recording, St
     for (place, ((cells, column), field)) in cells.into_iter().zip(source.columns()).zip(fields).enumerate() {
         match cells {
             ColumnCells::Numbers(mut values) => {
-                values.iter_mut().for_each(|value| *value = (field.to_si)(*value));
+                for value in &mut values {
+                    *value = (field.to_si)(*value);
+                }
                 recording.columns.push(Column { name: field.name, known: field.known, values, original: column.name.clone() });
             }
             ColumnCells::Texts(texts) => {

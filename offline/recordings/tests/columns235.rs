@@ -67,7 +67,10 @@ fn states_come_back_within_six_decimals_and_the_text_to_the_letter() {
         assert!(found.admit().is_ok());
         assert_eq!((found.sequence, found.hdr_seq), (index as u64 + 1, index as u32));
         assert_eq!((found.arms, found.runlevel, found.type_), (3, 3, [0, 0]));
-        assert_eq!((found.pos, found.pos_d, found.enc_vals, found.dac_val), (expected.pos, expected.pos_d, expected.enc_vals, expected.dac_val));
+        assert_eq!(
+            (found.pos, found.pos_d, found.enc_vals, found.dac_val),
+            (expected.pos, expected.pos_d, expected.enc_vals, expected.dac_val)
+        );
         assert_eq!((found.hdr_stamp_sec, found.hdr_stamp_nsec), (expected.hdr_stamp_sec, expected.hdr_stamp_nsec));
         assert_eq!((found.dt_sec, found.dt_nsec), (0, 1_000_000));
         assert_eq!(found.source_time_ns, index as i64 * 1_000_000);
@@ -117,7 +120,8 @@ fn the_older_order_is_refused_by_name() {
 
 /// A good file with one change.
 fn changed(change: impl FnOnce(&mut Vec<Vec<String>>)) -> Vec<u8> {
-    let scratch = Scratch::new("235-changed");
+    static COUNT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+    let scratch = Scratch::new(&format!("235-changed-{}", COUNT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)));
     let (path, _) = written(&scratch, 4);
     let text = std::fs::read_to_string(path).expect("text");
     let mut rows: Vec<Vec<String>> = text.lines().map(|row| row.split_whitespace().map(str::to_owned).collect()).collect();
@@ -192,7 +196,8 @@ fn a_file_that_is_cut_anywhere_yields_its_whole_rows() {
 #[test]
 fn line_ends_and_marks_of_other_systems_are_taken() {
     let unix = changed(|_| {});
-    let windows = [b"\xef\xbb\xbf".to_vec(), String::from_utf8(unix.clone()).expect("text").replace('\n', "\r\n").into_bytes()].concat();
+    let windows =
+        [b"\xef\xbb\xbf".to_vec(), String::from_utf8(unix.clone()).expect("text").replace('\n', "\r\n").into_bytes()].concat();
     let (expected, _) = read(Box::new(Reader::from_bytes(Path::new("unix.txt"), unix).expect("open")));
     let (found, damage) = read(Box::new(Reader::from_bytes(Path::new("windows.txt"), windows).expect("open")));
     assert_eq!((found, damage), (expected, None));

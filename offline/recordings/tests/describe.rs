@@ -114,7 +114,8 @@ fn words_gaps_and_odd_times_are_seen() {
 
 #[test]
 fn dvrk_names_tell_standstill_too() {
-    let found = of_text("t_s,q_1_rad,q_3_m,dq_1_rad_s,dq_3_m_s\n0,1,2,0.5,0\n1,1,2,0.005,0.0005\n2,1,2,0.005,0.0005\n3,1,2,0,0.1\n");
+    let found =
+        of_text("t_s,q_1_rad,q_3_m,dq_1_rad_s,dq_3_m_s\n0,1,2,0.5,0\n1,1,2,0.005,0.0005\n2,1,2,0.005,0.0005\n3,1,2,0,0.1\n");
     assert_eq!((found.standstill[0].share, found.standstill[0].longest_rows), (0.5, 2));
     let by_positions = of_text("t_s,q_act_1_rad\n0,1\n1,1\n2,2\n3,2\n");
     assert_eq!(by_positions.standstill[0].share, 0.5);
@@ -179,5 +180,7 @@ fn a_description_is_json_too() {
 fn damage_is_at_the_end_of_what_is_said() {
     let found = of_text("t_s,x_mm\n0,1\n1,2\n2\n");
     assert_eq!(found.damage.as_ref().expect("damage").place, "line 4");
-    assert!(check_shown(&found).ends_with("DAMAGED at line 4: has 1 cells where the header has 2; what is told above stands before\n"));
+    assert!(
+        check_shown(&found).ends_with("DAMAGED at line 4: has 1 cells where the header has 2; what is told above stands before\n")
+    );
 }

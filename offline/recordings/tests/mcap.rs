@@ -283,6 +283,22 @@ fn states_of_other_writers_are_read_from_any_topic_and_counted() {
     }
 }
 
+#[test]
+fn states_come_from_one_topic_only() {
+    let mut random = Random(25);
+    let states: Vec<RavenState> = (0..4).map(|_| random.state()).collect();
+    let bytes = foreign(WriteOptions::new(), |writer| {
+        add(writer, "/ravenstate", RAVEN_STATE.name, ROS1, RAVEN_STATE.definition, &encoded(&states));
+        add(writer, "/ravenstate_100hz", RAVEN_STATE.name, ROS1, RAVEN_STATE.definition, &encoded(&states[..2]));
+    });
+    let mut source = read(&bytes).expect("opens");
+    let (found, damage, error) = drain(&mut source);
+    assert_eq!((found.len(), damage, error), (4, None, None));
+    let channels = source.channels();
+    let counts: Vec<_> = channels.iter().map(|channel| (channel.topic.as_str(), channel.messages, channel.is_read)).collect();
+    assert_eq!(counts, [("/ravenstate", 4, true), ("/ravenstate_100hz", 2, false)]);
+}
+
 fn found_first(states: &[RavenState]) -> i64 {
     StateOrigin::of(&states[0]).header.time_ns()
 }
@@ -399,6 +415,22 @@ fn a_log_gets_its_name_at_the_end_and_overwrites_no_earlier_part() {
     log.finish().expect("finished");
     assert!(path.exists() && !scratch.path().join("run.mcap.part").exists());
     assert_eq!(McapSource::open(&path).expect("opens").metadata(), pairs());
+}
+
+#[test]
+fn a_hole_of_zeros_is_damage_where_it_begins() {
+    let scratch = Scratch::new("mcap-hole");
+    let mut log = McapLog::create(&scratch.path().join("run.mcap"), &[]).expect("created");
+    let records = Random(24).records(5);
+    write_all(&mut log, &records);
+    log.flush().expect("flushed");
+    let mut bytes = std::fs::read(log.part()).expect("bytes");
+    let whole = bytes.len() as u64;
+    bytes.resize(bytes.len() + 10_000, 0);
+    let (found, damage, error) = drain(&mut read(&bytes).expect("opens"));
+    assert_same(&found, &records);
+    let expected = Damage { place: Place::Byte(whole), what: "a record of kind 0, which there is not".to_owned() };
+    assert_eq!((damage, error), (Some(expected), None));
 }
 
 const LOG_ROLE: &str = "RAVENPOSE_TEST_LOG";

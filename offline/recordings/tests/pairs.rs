@@ -2,221 +2,19 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "pairs/made.rs"]
+mod made;
+#[path = "pairs/refusals.rs"]
+mod refusals;
 
 use common::data;
+use made::{Case, Motion, Path, Random, dropped, make};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use recordings::pairs::{
-    Clock, ClockChoice, Interpolation, Limits, Options, Pair, PairError, Paired, Reason, RegistrationChoice, Reported, Rigid, Truth,
-    pair, register, sample,
+    ClockChoice, Interpolation, Limits, Options, Pair, PairError, Reason, RegistrationChoice, Reported, Truth, pair, register,
+    sample,
 };
 use recordings::{Column, Recording};
-
-/// SplitMix64 (Vigna).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.uniform()
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    fn normal3(&mut self) -> Vector3<f64> {
-        Vector3::new(self.normal(), self.normal(), self.normal())
-    }
-}
-
-/// What a run is made of.
-#[derive(Clone)]
-struct Case {
-    seed: u64,
-    duration_s: f64,
-    state_hz: f64,
-    truth_hz: f64,
-    offset_s: f64,
-    drift: f64,
-    /// Noise of the truth per axis, m.
-    noise_m: f64,
-    /// The arm's own slow error: standard deviation per axis, m, and correlation time, s.
-    arm_error_m: f64,
-    arm_error_s: f64,
-    /// A constant error of the arm, m.
-    arm_offset_m: Vector3<f64>,
-    /// Share of frames that are lost, and that show something else.
-    lost: f64,
-    wrong: f64,
-    motion: Motion,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Motion {
-    Teleoperation,
-    Still,
-    Line,
-    Circle,
-    Loop,
-}
-
-impl Default for Case {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            duration_s: 60.0,
-            state_hz: 1000.0,
-            truth_hz: 15.0,
-            offset_s: -0.6,
-            drift: 0.0,
-            noise_m: 0.5e-3,
-            arm_error_m: 0.0,
-            arm_error_s: 1.0,
-            arm_offset_m: Vector3::zeros(),
-            lost: 0.0,
-            wrong: 0.0,
-            motion: Motion::Teleoperation,
-        }
-    }
-}
-
-/// A made run with everything that is hidden from the code under test.
-struct Run {
-    t_s: Vec<f64>,
-    position_m: [Vec<f64>; 3],
-    truth: Truth,
-    frame: Rigid,
-    clock: Clock,
-    lost: usize,
-    wrong: Vec<usize>,
-}
-
-/// Tip over time: waves of several seconds, as a surgeon's hand has them.
-struct Path {
-    motion: Motion,
-    waves: Vec<[(f64, f64, f64); 3]>,
-}
-
-impl Path {
-    fn new(motion: Motion, random: &mut Random) -> Self {
-        let waves = (0..7)
-            .map(|_| {
-                std::array::from_fn(|_| (random.between(2e-3, 12e-3), random.between(0.04, 0.45), random.between(0.0, 6.28)))
-            })
-            .collect();
-        Self { motion, waves }
-    }
-
-    fn wave(&self, axis: usize, t_s: f64) -> f64 {
-        let sum: f64 = self.waves.iter().map(|wave| wave[axis].0 * (6.28 * wave[axis].1 * t_s + wave[axis].2).sin()).sum();
-        [-0.09, -0.02, 0.12][axis] + sum
-    }
-
-    fn at(&self, t_s: f64) -> Vector3<f64> {
-        match self.motion {
-            Motion::Teleoperation => Vector3::from_fn(|axis, _| self.wave(axis, t_s)),
-            Motion::Still => Vector3::new(-0.09, -0.02, 0.12),
-            Motion::Line => Vector3::new(-0.09, -0.02, 0.12) + Vector3::new(1.0, 2.0, -0.5) * self.wave(0, t_s),
-            Motion::Circle => Vector3::new(0.03 * (2.0 * t_s).cos(), 0.03 * (2.0 * t_s).sin(), 0.1),
-            // Closes after 2 s and has corners enough to know where on it one is.
-            Motion::Loop => {
-                let phase = std::f64::consts::PI * t_s;
-                Vector3::new(0.03 * phase.sin() + 0.008 * (2.0 * phase).cos(), 0.02 * (2.0 * phase).sin(), 0.1 + 0.015 * (3.0 * phase).cos())
-            }
-        }
-    }
-}
-
-fn make(case: &Case) -> Run {
-    let mut random = Random(case.seed.wrapping_mul(0x1234_5678_9abc_def1) + 77);
-    let path = Path::new(case.motion, &mut random);
-    let rotation = Rotation3::new(random.normal3());
-    let translation = random.normal3() * 0.2;
-    let frame = Rigid {
-        rotation: std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)])),
-        translation_m: translation.into(),
-    };
-    let rows = (case.duration_s * case.state_hz) as usize;
-    let t_s: Vec<f64> = (0..rows).map(|i| 100.0 + i as f64 / case.state_hz).collect();
-    // Published in whole micrometres, cut toward zero.
-    let micrometres = |value: f64| (value * 1e6).trunc() / 1e6;
-    let places: Vec<Vector3<f64>> = t_s.iter().map(|&t| path.at(t).map(micrometres)).collect();
-    let position_m = std::array::from_fn(|axis| places.iter().map(|place| place[axis]).collect());
-    let first_s = 100.0 - case.offset_s + 0.7;
-    let count = ((case.duration_s - 1.4) * case.truth_hz) as usize;
-    let reference_s = first_s + 0.5 * (count - 1) as f64 / case.truth_hz;
-    let clock = Clock { offset_s: case.offset_s, drift: case.drift, reference_s };
-    let keep = (-1.0 / case.truth_hz / case.arm_error_s).exp();
-    let mut error = random.normal3() * case.arm_error_m;
-    let (mut truth, mut lost, mut wrong) = (Truth::default(), 0, Vec::new());
-    for i in 0..count {
-        let t_truth_s = first_s + i as f64 / case.truth_hz;
-        error = error * keep + random.normal3() * case.arm_error_m * (1.0 - keep * keep).sqrt();
-        let noise = random.normal3() * case.noise_m;
-        let place = path.at(clock.state_time_s(t_truth_s)) + error + case.arm_offset_m + noise;
-        let mut seen = rotation.inverse() * (place - translation);
-        if random.uniform() < case.lost {
-            seen = Vector3::repeat(f64::NAN);
-            lost += 1;
-        } else if random.uniform() < case.wrong {
-            seen += random.normal3().normalize() * random.between(0.02, 0.15);
-            wrong.push(i);
-        }
-        truth.t_s.push(t_truth_s);
-        truth.position_m.push(seen.into());
-    }
-    Run { t_s, position_m, truth, frame, clock, lost, wrong }
-}
-
-impl Run {
-    fn reported(&self) -> Reported<'_> {
-        let [x, y, z] = &self.position_m;
-        Reported { t_s: &self.t_s, position_m: [x, y, z], quaternion: None, runlevel: None }
-    }
-
-    fn pair(&self, options: &Options) -> Result<Paired, PairError> {
-        pair(&self.reported(), &self.truth, options)
-    }
-
-    /// Errors over standard errors: offset, drift, rotation about x, y, z, middle x, y, z.
-    fn deviations(&self, paired: &Paired) -> [f64; 8] {
-        let report = &paired.report;
-        let offset = paired.clock.state_time_s(self.clock.reference_s) - self.clock.state_time_s(self.clock.reference_s);
-        let matrix = |rigid: &Rigid| nalgebra::Matrix3::from_fn(|row, column| rigid.rotation[row][column]);
-        let turned = Rotation3::from_matrix_unchecked(matrix(&paired.registration) * matrix(&self.frame).transpose()).scaled_axis();
-        let middle = self.middle();
-        let moved = Vector3::from(paired.registration.apply(middle)) - Vector3::from(self.frame.apply(middle));
-        let drift = paired.clock.drift - self.clock.drift;
-        [
-            offset / report.clock.offset_sd_s,
-            if report.clock.drift_fitted { drift / (report.clock.drift_sd_ppm * 1e-6) } else { 0.0 },
-            turned[0] / report.registration.rotation_sd_rad[0],
-            turned[1] / report.registration.rotation_sd_rad[1],
-            turned[2] / report.registration.rotation_sd_rad[2],
-            moved[0] / report.registration.centre_sd_m[0],
-            moved[1] / report.registration.centre_sd_m[1],
-            moved[2] / report.registration.centre_sd_m[2],
-        ]
-    }
-
-    fn middle(&self) -> [f64; 3] {
-        let seen: Vec<&[f64; 3]> =
-            self.truth.position_m.iter().filter(|position| position.iter().all(|value| value.is_finite())).collect();
-        std::array::from_fn(|axis| seen.iter().map(|position| position[axis]).sum::<f64>() / seen.len() as f64)
-    }
-}
-
-fn dropped(paired: &Paired, reason: Reason) -> usize {
-    paired.report.dropped.iter().find(|dropped| dropped.reason == reason).expect("every reason is listed").frames
-}
 
 /// Share of 95 % intervals that hold the true value, per parameter, over seeds.
 fn coverage(cases: impl Iterator<Item = Case>) -> [f64; 8] {
@@ -267,7 +65,10 @@ fn a_slow_error_of_the_arm_widens_the_stated_errors() {
     println!("standard error of the offset: {ratio:.1} times that of white noise of the same size");
     assert!(ratio > 1.5, "{ratio}");
     let noise = slow.report.label.noise_sd_m;
-    assert!(noise.iter().all(|noise| (0.4e-3..1.1e-3).contains(noise)), "the frame-to-frame noise is not the arm's error: {noise:?}");
+    assert!(
+        noise.iter().all(|noise| (0.4e-3..1.1e-3).contains(noise)),
+        "the frame-to-frame noise is not the arm's error: {noise:?}"
+    );
 }
 
 #[test]
@@ -281,24 +82,56 @@ fn outliers_and_lost_frames_are_named_and_change_nothing() {
         assert!(named * 100 >= run.wrong.len() * 97, "seed {seed}: {named} of {} outliers were named", run.wrong.len());
         let falsely = dropped(&paired, Reason::Outlier) - named;
         assert!(falsely * 100 <= run.truth.t_s.len(), "seed {seed}: {falsely} good frames were called outliers");
-        assert!(run.deviations(&paired).iter().all(|deviation| deviation.abs() < 4.5), "seed {seed}: {:?}", run.deviations(&paired));
+        assert!(
+            run.deviations(&paired).iter().all(|deviation| deviation.abs() < 4.5),
+            "seed {seed}: {:?}",
+            run.deviations(&paired)
+        );
         let taken: usize = paired.report.dropped.iter().map(|dropped| dropped.frames).sum();
         assert_eq!(taken + paired.pairs.len(), run.truth.t_s.len());
     }
 }
 
 #[test]
-fn a_drift_over_twenty_minutes_is_found() {
-    let case = Case { duration_s: 1200.0, state_hz: 100.0, offset_s: 3.2, drift: 180e-6, arm_error_m: 2e-3, ..Case::default() };
+fn a_drift_over_two_hours_is_found() {
+    // As long as the paper's data set; the drift alone moves the ends apart by 1.5 s.
+    let case = Case {
+        duration_s: 8400.0,
+        state_hz: 100.0,
+        offset_s: 3.2,
+        drift: 180e-6,
+        arm_error_m: 3e-3,
+        arm_error_s: 5.0,
+        lost: 0.05,
+        wrong: 0.01,
+        ..Case::default()
+    };
     let run = make(&case);
+    let begun = std::time::Instant::now();
     let paired = run.pair(&Options::default()).expect("pairs");
+    println!("{} states and {} frames in {:.1} s", run.t_s.len(), run.truth.t_s.len(), begun.elapsed().as_secs_f64());
     println!("{}", paired.report);
     assert!(paired.report.clock.drift_fitted);
     assert!(run.deviations(&paired).iter().all(|deviation| deviation.abs() < 4.0), "{:?}", run.deviations(&paired));
-    assert!((paired.report.clock.drift_ppm - 180.0).abs() < 10.0);
+    assert!((paired.report.clock.drift_ppm - 180.0).abs() < 3.0);
     let last = paired.pairs.last().expect("pairs");
     let true_time_s = run.clock.state_time_s(last.truth_time_s);
     assert!((last.state_time_s - true_time_s).abs() < 5e-3, "at the end: {} against {true_time_s}", last.state_time_s);
+}
+
+#[test]
+fn a_quarter_of_wrong_positions_does_no_harm() {
+    for seed in 0..10 {
+        let run = make(&Case { seed, wrong: 0.25, ..Case::default() });
+        let paired = run.pair(&Options::default()).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        assert!(
+            run.deviations(&paired).iter().all(|deviation| deviation.abs() < 4.5),
+            "seed {seed}: {:?}",
+            run.deviations(&paired)
+        );
+        let (named, wrong) = (dropped(&paired, Reason::Outlier), run.wrong.len());
+        assert!(named * 10 >= wrong * 9, "seed {seed}: {named} of {wrong}");
+    }
 }
 
 #[test]
@@ -350,70 +183,6 @@ fn a_constant_offset_of_the_arm_hides_in_a_fitted_registration_only() {
     assert!(!known.report.registration.fitted && known.report.clock.fitted);
 }
 
-fn refused(case: &Case, options: &Options) -> PairError {
-    let error = match make(case).pair(options) {
-        Ok(paired) => panic!("seed {} must be refused:\n{}", case.seed, paired.report),
-        Err(error) => error,
-    };
-    println!("{error}");
-    assert!(!error.to_string().contains('\n'));
-    error
-}
-
-#[test]
-fn motion_that_cannot_tell_is_refused_with_what_was_measured() {
-    let options = Options::default();
-    for seed in 0..12 {
-        let of = |motion| Case { seed, motion, ..Case::default() };
-        assert!(matches!(refused(&of(Motion::Still), &options), PairError::TooLittleMotion { spread_m, .. } if spread_m < 1e-6));
-        let line = refused(&of(Motion::Line), &options);
-        assert!(matches!(line, PairError::Degenerate { spread_m, .. } if spread_m[0] > 5e-3 && spread_m[1] < 1e-3), "{line}");
-        // On a circle at constant speed a delay is a rotation.
-        let circle = refused(&of(Motion::Circle), &options);
-        let told = matches!(circle, PairError::ClockUndetermined { .. } | PairError::TooLittleMotion { .. } | PairError::Degenerate { .. });
-        assert!(told, "{circle}");
-        let closed = refused(&of(Motion::Loop), &options);
-        let PairError::Ambiguous { first_s, second_s, .. } = closed else { panic!("{closed}") };
-        let turns = (first_s - second_s) / 2.0;
-        assert!(turns.round() != 0.0 && (turns - turns.round()).abs() < 0.01, "{closed}");
-    }
-    // The same loop within less than a turn is told.
-    let narrow = Options { clock: ClockChoice::Fit { expected_offset_s: -0.5, window_s: 0.9, drift_max: 5e-4 }, ..options };
-    let closed = make(&Case { motion: Motion::Loop, ..Case::default() }).pair(&narrow).expect("pairs");
-    assert!((closed.clock.offset_s + 0.6).abs() < 2e-3);
-}
-
-#[test]
-fn streams_that_do_not_belong_together_are_refused() {
-    for seed in 0..20 {
-        let (one, other) = (make(&Case { seed, ..Case::default() }), make(&Case { seed: seed + 1000, ..Case::default() }));
-        let error = pair(&one.reported(), &other.truth, &Options::default()).expect_err("two runs");
-        assert!(matches!(error, PairError::NoAgreement { .. } | PairError::TooLittleMotion { .. }), "seed {seed}: {error}");
-    }
-    let late = Case { offset_s: -900.0, ..Case::default() };
-    assert!(matches!(refused(&late, &Options::default()), PairError::NoOverlap { .. }));
-    let told = Options { clock: ClockChoice::Fit { expected_offset_s: -898.0, window_s: 5.0, drift_max: 5e-4 }, ..Options::default() };
-    assert!((make(&late).pair(&told).expect("pairs").clock.offset_s + 900.0).abs() < 2e-3);
-    let outside = refused(&Case { offset_s: 7.0, ..Case::default() }, &Options::default());
-    assert!(matches!(outside, PairError::NoAgreement { .. } | PairError::AtEdge { .. } | PairError::TooLittleMotion { .. }), "{outside}");
-}
-
-#[test]
-fn a_run_too_short_for_the_offset_is_refused() {
-    let slow = Case { duration_s: 12.0, arm_error_m: 8e-3, arm_error_s: 2.0, ..Case::default() };
-    let mut refusals = 0;
-    for seed in 0..10 {
-        match make(&Case { seed, ..slow.clone() }).pair(&Options::default()) {
-            Err(error) => {
-                println!("{error}");
-                refusals += 1;
-            }
-            Ok(paired) => assert!(paired.report.clock.offset_sd_s <= 0.02),
-        }
-    }
-    assert!(refusals >= 5, "{refusals} of 10 were refused");
-}
-
 #[test]
 fn gaps_runlevels_repeats_and_standstill_are_counted_by_frame() {
     let mut run = make(&Case { noise_m: 1e-5, ..Case::default() });
@@ -429,18 +198,12 @@ fn gaps_runlevels_repeats_and_standstill_are_counted_by_frame() {
     let axes = [chosen(&run.position_m[0]), chosen(&run.position_m[1]), chosen(&run.position_m[2])];
     // The pedal is up for three seconds.
     let levels: Vec<f64> = t_s.iter().map(|t| if (130.0..133.0).contains(t) { 2.0 } else { 3.0 }).collect();
-    let reported =
-        Reported { t_s: &t_s, position_m: [&axes[0], &axes[1], &axes[2]], quaternion: None, runlevel: Some(&levels) };
-    let options = Options {
-        clock: ClockChoice::Known(run.clock),
-        registration: RegistrationChoice::Known(run.frame),
-        ..Options::default()
-    };
+    let reported = Reported { t_s: &t_s, position_m: [&axes[0], &axes[1], &axes[2]], quaternion: None, runlevel: Some(&levels) };
+    let options =
+        Options { clock: ClockChoice::Known(run.clock), registration: RegistrationChoice::Known(run.frame), ..Options::default() };
     let paired = pair(&reported, &run.truth, &options).expect("pairs");
     println!("{}", paired.report);
-    let within = |from: f64, to: f64| {
-        run.truth.t_s.iter().filter(|t| (from..to).contains(&run.clock.state_time_s(**t))).count()
-    };
+    let within = |from: f64, to: f64| run.truth.t_s.iter().filter(|t| (from..to).contains(&run.clock.state_time_s(**t))).count();
     assert_eq!(dropped(&paired, Reason::StateGap), within(120.0, 122.0));
     assert_eq!(dropped(&paired, Reason::Runlevel), within(130.0, 133.0));
     // The first of the repeated ones is 1/15 s old when it comes again: the arm has moved, the label has jumped.
@@ -456,32 +219,6 @@ fn gaps_runlevels_repeats_and_standstill_are_counted_by_frame() {
     let paired = still.pair(&options).expect("pairs");
     assert!((55..=62).contains(&paired.pairs.len()), "one a second: {}", paired.pairs.len());
     assert_eq!(dropped(&paired, Reason::Standstill), still.truth.t_s.len() - paired.pairs.len());
-}
-
-#[test]
-fn bad_columns_are_refused_in_one_line() {
-    let run = make(&Case::default());
-    let mut cut = run.truth.clone();
-    cut.position_m.pop();
-    let mut back = run.truth.clone();
-    back.t_s[7] = back.t_s[6];
-    let mut nan = run.truth.clone();
-    nan.t_s[7] = f64::NAN;
-    let few = Truth { t_s: run.truth.t_s[..20].to_vec(), position_m: run.truth.position_m[..20].to_vec(), quaternion: None };
-    for (truth, expected) in [
-        (cut, "the truth stream: a column has 878 values for 879 times; give one for each"),
-        (back, "the truth stream, row 7: time 101.7 s does not rise above 101.7 s; sort the rows and drop repeated times"),
-        (nan, "the truth stream, row 7: time NaN s does not rise above 101.7 s; sort the rows and drop repeated times"),
-        (few, "only 20 of 20 true positions can be matched with a state, 30 are needed; record longer, or check the cameras"),
-        (Truth::default(), "only 0 of 0 true positions can be matched with a state, 30 are needed; record longer, or check the cameras"),
-    ] {
-        let error = pair(&run.reported(), &truth, &Options::default()).expect_err(expected).to_string();
-        assert!(error.contains("row 7") && expected.contains("row 7") || error == expected, "{error}");
-    }
-    let short = Reported { position_m: [&run.position_m[0][1..], &run.position_m[1], &run.position_m[2]], ..run.reported() };
-    assert!(matches!(pair(&short, &run.truth, &Options::default()), Err(PairError::Column { stream: "reported", .. })));
-    let empty = Reported { t_s: &[], position_m: [&[], &[], &[]], quaternion: None, runlevel: None };
-    assert!(pair(&empty, &run.truth, &Options::default()).is_err());
 }
 
 #[test]
@@ -518,7 +255,8 @@ fn orientation_labels_leave_the_mounting_out() {
     run.truth.quaternion = Some(run.truth.t_s.iter().map(seen).collect());
     let [w, x, y, z] = &columns;
     let reported = Reported { quaternion: Some([w, x, y, z]), ..run.reported() };
-    let options = Options { clock: ClockChoice::Known(run.clock), registration: RegistrationChoice::Known(run.frame), ..Options::default() };
+    let options =
+        Options { clock: ClockChoice::Known(run.clock), registration: RegistrationChoice::Known(run.frame), ..Options::default() };
     let paired = pair(&reported, &run.truth, &options).expect("pairs");
     let report = paired.report.orientation.expect("both have orientations");
     assert_eq!(report.pairs, paired.pairs.len());
@@ -528,14 +266,19 @@ fn orientation_labels_leave_the_mounting_out() {
         let found = Vector3::from(pair.rotation_label_rad.expect("label"));
         worst = worst.max((found - expected).norm());
     }
-    println!("orientation labels are off by {:.3} deg at most, RMS label {:.2} deg", worst.to_degrees(), report.rms_rad.to_degrees());
+    println!(
+        "orientation labels are off by {:.3} deg at most, RMS label {:.2} deg",
+        worst.to_degrees(),
+        report.rms_rad.to_degrees()
+    );
     assert!(worst < 0.006, "{worst}: the mean of the arm's error goes into the mounting, no more");
 }
 
 #[test]
 fn matched_points_are_registered_and_a_line_is_refused() {
     let run = make(&Case { noise_m: 0.2e-3, offset_s: 0.0, ..Case::default() });
-    let options = Options { clock: ClockChoice::Known(run.clock), registration: RegistrationChoice::Known(run.frame), ..Options::default() };
+    let options =
+        Options { clock: ClockChoice::Known(run.clock), registration: RegistrationChoice::Known(run.frame), ..Options::default() };
     let paired = run.pair(&options).expect("pairs");
     let mut truth: Vec<[f64; 3]> = paired.pairs.iter().map(|pair| run.truth.position_m[pair.frame]).collect();
     let reported: Vec<[f64; 3]> = paired.pairs.iter().map(|pair| pair.reported_m).collect();
@@ -587,7 +330,8 @@ fn recordings_give_streams_with_the_truth_inside_or_beside() {
     let truth = Truth::from_recording(&vision).expect("truth");
     let paired = pair(&Reported::from_recording(&states).expect("states"), &truth, &Options::default()).expect("pairs");
     assert_eq!(paired.pairs, run.pair(&Options::default()).expect("pairs").pairs);
-    let missing = Reported::from_recording(&vision).map(|_| ()).and(Truth::from_recording(&recording(&[("t_s", vec![0.0])])).map(|_| ()));
+    let missing =
+        Reported::from_recording(&vision).map(|_| ()).and(Truth::from_recording(&recording(&[("t_s", vec![0.0])])).map(|_| ()));
     assert_eq!(
         missing.expect_err("no columns").to_string(),
         "made: has no column `x_m`; pairs need time (t_s) and the tip's position on both sides (x_mm, y_mm, z_mm and truth_x_mm, truth_y_mm, truth_z_mm)"

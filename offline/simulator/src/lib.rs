@@ -8,6 +8,7 @@
 //! - [`simulation`]: an arm and its controller, cycle by cycle.
 //! - [`trajectory`]: where it is commanded to go.
 //! - [`production`]: whole runs as full states with their truth.
+//! - [`replay`]: amplifier commands of a recording played into the plant.
 //!
 //! ```
 //! use simulator::{Command, Robot, Simulation};
@@ -26,6 +27,7 @@ pub mod model;
 pub mod physics;
 pub mod production;
 pub mod plant;
+pub mod replay;
 pub mod simulation;
 pub mod trajectory;
 

@@ -5,11 +5,14 @@ use arm::{JOINTS, Motors, Raven2, Side};
 
 use crate::model::{Bound, Effect, Robot};
 use crate::physics::{LinkGeometry, Physics};
-use crate::plant::{CableLaw, Drive, DriveNumbers, Method, Plant, PlantError, Rubbing, Timed};
+use crate::plant::{CableLaw, Drive, DriveNumbers, JOINTS_MAX, Method, Plant, PlantError, Rubbing, Stiction, Timed};
 use crate::tool_axes::{FIRST, ToolAxes};
 
 /// Capstan torque under which a motor warms up by one unit: about the RMS torque of teleoperation, N·m **(assumed)**.
 const TORQUE_REF_NM: [f64; JOINTS] = [0.15, 0.15, 0.1, 0.03, 0.03, 0.03, 0.03];
+
+/// Rate times step up to which the explicit method is used: it is stable to 2.78, and the mass matrix changes with posture.
+const EXPLICIT_MAX: f64 = 2.0;
 
 /// Effects that the three positioning joints can have, but not a tool axis, whose transmission is rigid.
 const NEEDS_A_CABLE: &str = "the cables of joints 4 to 7 are rigid here; on them this effect cannot be";
@@ -25,21 +28,29 @@ pub(crate) fn build(robot: &Robot, side: Side, homing_offset: &Motors) -> Result
         vec![table.coupling_02, table.coupling_12, 1.0],
     ];
     let integrator = &raven.plant().integrator;
-    // The plant file names the method of the nominal plant, which is smooth; effects are not.
-    let smooth = integrator.method == "rk4" && robot.effects.is_empty() && robot.cables.is_none();
-    let method = if smooth { Method::Rk4 } else { Method::Rosenbrock };
-    let mut plant = Plant::new(raven.rigid_body(side), &numbers, &coupling, method, integrator.substep_s)?;
+    let mut plant = Plant::new(raven.rigid_body(side), &numbers, &coupling, Method::Rk4, integrator.substep_s)?;
     let drives = (FIRST..JOINTS).map(|joint| Drive::new(tool_drive(raven, side, joint))).collect();
     let mut tool = ToolAxes::new(drives, &[0.0; JOINTS]);
     for (joint, offset) in homing_offset.iter().enumerate().filter(|(_, offset)| **offset != 0.0) {
         let offset = Timed::new(crate::physics::JointOffset { o: *offset }, f64::NEG_INFINITY, f64::INFINITY);
         if joint < FIRST { plant.add_offset(offset, joint) } else { tool.offsets.push((offset, joint)) }
     }
+    if let Some(presliding) = robot.presliding {
+        for (joint, presliding) in presliding.into_iter().enumerate() {
+            let slot = plant.memory()?;
+            plant.drive_mut(joint).stiction = Some(Stiction { presliding, slot });
+        }
+    }
     for effect in &robot.effects {
         add(&mut plant, &mut tool, effect)?;
     }
     plant.at(0.0);
     tool.at(0.0);
+    let mut home = [0.0; JOINTS_MAX];
+    home[..FIRST].copy_from_slice(&raven.plant().limits.home[..FIRST]);
+    let stable = plant.fastest_rate(&home) * integrator.substep_s < EXPLICIT_MAX;
+    let method = if integrator.method == "rk4" && stable { Method::Rk4 } else { Method::Rosenbrock };
+    plant.set_step(method, integrator.substep_s);
     Ok((plant, tool))
 }
 

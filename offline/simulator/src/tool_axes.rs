@@ -130,6 +130,6 @@ impl ToolAxes {
 fn friction(drive: &Drive, speed: f64, warm: f64) -> (f64, f64) {
     let to_capstan = drive.nominal.gear / drive.nominal.ratio;
     let (motor, motor_slope) = drive.motor_friction(speed, warm);
-    let joint = drive.joint_friction(speed / drive.nominal.ratio, warm);
+    let joint = drive.joint_friction(speed / drive.nominal.ratio, warm, &[]);
     (motor + to_capstan * joint.torque, motor_slope + to_capstan / drive.nominal.ratio * joint.slope)
 }

@@ -31,7 +31,8 @@ pub enum BaseParametersError {
     NotFinite,
     /// No clear rank.
     #[error(
-        "base parameters: no clear rank, singular values {kept:e} and {dropped:e} follow each other; the arm nearly degenerates, round its geometry"
+        "base parameters: no clear rank, singular values {kept:e} and {dropped:e} follow each other; the arm nearly \
+         degenerates, round its geometry"
     )]
     NoClearRank {
         /// Smallest singular value that would count.

@@ -75,7 +75,8 @@ pub enum UrdfError {
     },
     /// A link that hangs on two joints.
     #[error(
-        "URDF line {line}, joint {joint}: link `{link}` already hangs on joint `{other}`; closed loops cannot be represented, remove one joint"
+        "URDF line {line}, joint {joint}: link `{link}` already hangs on joint `{other}`; closed loops cannot be represented, \
+         remove one joint"
     )]
     TwoParents {
         /// Line of the second joint.
@@ -105,7 +106,8 @@ pub enum UrdfError {
     },
     /// Moving joints on several branches.
     #[error(
-        "URDF: the arm branches at link `{link}` into joints {joints}; name the tip link of the chain that is meant (known tips: {tips}), or remove the other branches"
+        "URDF: the arm branches at link `{link}` into joints {joints}; name the tip link of the chain that is meant (known \
+         tips: {tips}), or remove the other branches"
     )]
     Branch {
         /// Where it branches.
@@ -125,7 +127,8 @@ pub enum UrdfError {
     },
     /// A joint that a serial arm with one degree of freedom per joint has not.
     #[error(
-        "URDF line {line}, joint {joint}: {kind} joints cannot be represented; replace it by revolute, continuous, prismatic or fixed joints"
+        "URDF line {line}, joint {joint}: {kind} joints cannot be represented; replace it by revolute, continuous, prismatic or \
+         fixed joints"
     )]
     JointKind {
         /// Line.

@@ -28,8 +28,7 @@ impl Colour {
 
     /// The choices in their order, again from the first after the last.
     pub fn choice(index: usize) -> Self {
-        const CHOICES: [Colour; 6] =
-            [Colour::BLUE, Colour::VERMILLION, Colour::GREEN, Colour::PURPLE, Colour::ORANGE, Colour::SKY];
+        const CHOICES: [Colour; 6] = [Colour::BLUE, Colour::VERMILLION, Colour::GREEN, Colour::PURPLE, Colour::ORANGE, Colour::SKY];
         CHOICES[index % CHOICES.len()]
     }
 

@@ -169,7 +169,8 @@ fn draw(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, mark: &Mark) {
         Mark::Steps { colour, histogram, .. } => {
             let edge = |i: usize| layout.x(histogram.low + histogram.width * i as f64);
             let height = |count: &u64| place.y(*count as f64);
-            let steps = histogram.counts.iter().enumerate().flat_map(|(i, count)| [(edge(i), height(count)), (edge(i + 1), height(count))]);
+            let steps =
+                histogram.counts.iter().enumerate().flat_map(|(i, count)| [(edge(i), height(count)), (edge(i + 1), height(count))]);
             let ends = [(edge(0), place.y(0.0)), (edge(histogram.counts.len()), place.y(0.0))];
             let path = stroke([ends[0]].into_iter().chain(steps).chain([ends[1]]));
             let _ = write!(out, "<path class=\"steps s{0} f{0}\" d=\"{path}\"/>", colour.number());
@@ -209,25 +210,36 @@ fn paint(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, cells: &Cells
         Ramp::Heat => level(value, (low, high), levels),
         Ramp::Density => level(value.ln(), (low.ln(), high.ln()), levels),
     };
+    // Whole numbers in the grid's own coordinates, equal neighbours as one: half the size of px.
     let mut paths = vec![String::new(); levels];
-    let step_x = (cells.x.1 - cells.x.0) / cells.columns.max(1) as f64;
-    let step_y = (cells.y.1 - cells.y.0) / cells.rows().max(1) as f64;
-    for (i, value) in cells.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
-        let (column, row) = ((i % cells.columns) as f64, (i / cells.columns) as f64);
-        let (left, right) = (layout.x(cells.x.0 + column * step_x), layout.x(cells.x.0 + (column + 1.0) * step_x));
-        let (top, bottom) = (place.y(cells.y.0 + (row + 1.0) * step_y), place.y(cells.y.0 + row * step_y));
-        let (w, h) = (coordinate(right - left), coordinate(bottom - top));
-        let path = &mut paths[of(*value)];
-        let _ = write!(path, "M{} {}h{w}v{h}h-{w}z", coordinate(left), coordinate(top));
+    for (row, values) in cells.values.chunks(cells.columns.max(1)).enumerate() {
+        let mut column = 0;
+        while column < values.len() {
+            let shade = values[column].is_finite().then(|| of(values[column]));
+            let run = values[column..].iter().take_while(|value| value.is_finite().then(|| of(**value)) == shade).count();
+            if let Some(shade) = shade {
+                let _ = write!(paths[shade], "M{column} {row}h{run}v1h-{run}z");
+            }
+            column += run;
+        }
     }
+    let (left, bottom) = (layout.x(cells.x.0), place.y(cells.y.0));
+    let width = (layout.x(cells.x.1) - left) / cells.columns.max(1) as f64;
+    let height = (bottom - place.y(cells.y.1)) / cells.rows().max(1) as f64;
+    let _ = write!(
+        out,
+        "<g transform=\"translate({left:.2} {bottom:.2}) scale({width:.4} -{height:.4})\" shape-rendering=\"crispEdges\">"
+    );
     for (i, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
-        let _ = write!(out, "<path class=\"{letter}{i}\" shape-rendering=\"crispEdges\" d=\"{path}\"/>");
+        let _ = write!(out, "<path class=\"{letter}{i}\" d=\"{path}\"/>");
     }
+    out.push_str("</g>");
 }
 
 fn colour_bar(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, cells: &Cells) {
     let (low, high) = cells.range();
-    if !(low < high) {
+    // One value, or none.
+    if low >= high {
         return;
     }
     let left = layout::bar_left(layout);

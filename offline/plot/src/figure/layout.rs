@@ -67,7 +67,10 @@ impl<'a> Layout<'a> {
             places.push(Place { panel, top, height: panel.height_px, range, ticks: ticks(range.0, range.1, most) });
             top += panel.height_px + 8.0;
         }
-        let labels = places.iter().flat_map(|place| place.ticks.labels.iter()).chain(figure.panels.iter().flat_map(|panel| &panel.y.categories));
+        let labels = places
+            .iter()
+            .flat_map(|place| place.ticks.labels.iter())
+            .chain(figure.panels.iter().flat_map(|panel| &panel.y.categories));
         let left = (labels.map(|label| text_width(label)).fold(16.0, f64::max) + 9.0).min(MARGIN_LEFT_MAX);
         let width = (figure.width_px - left - margin_right(figure)).max(40.0);
         let data = union(figure.panels.iter().flat_map(|panel| panel.marks.iter().map(|mark| mark.extent().0)));

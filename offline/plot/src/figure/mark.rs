@@ -127,7 +127,9 @@ impl Mark {
     /// Extent in x and y.
     pub(super) fn extent(&self) -> ((f64, f64), (f64, f64)) {
         const NONE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
-        let of = |points: &mut dyn Iterator<Item = Point>| points.fold((NONE, NONE), |(x, y), point| (widen(x, point.0), widen(y, point.1)));
+        let of = |points: &mut dyn Iterator<Item = Point>| {
+            points.fold((NONE, NONE), |(x, y), point| (widen(x, point.0), widen(y, point.1)))
+        };
         match self {
             Self::Line { strokes, .. } => of(&mut strokes.iter().flatten().copied()),
             Self::Dots { points, .. } => of(&mut points.iter().copied()),

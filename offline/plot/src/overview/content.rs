@@ -156,7 +156,12 @@ impl<'a> Content<'a> {
     }
 }
 
-fn chosen(recording: &Recording, time: Option<&[f64]>, rows: usize, options: &Options) -> Result<std::ops::Range<usize>, PlotError> {
+fn chosen(
+    recording: &Recording,
+    time: Option<&[f64]>,
+    rows: usize,
+    options: &Options,
+) -> Result<std::ops::Range<usize>, PlotError> {
     let row = |limit: f64| time.map_or_else(|| (limit.max(0.0) as usize).min(rows), |time| time.partition_point(|t| *t < limit));
     let first = options.from_s.map_or(0, row);
     let end = options.to_s.map_or(rows, |to| row(to.next_up()));
@@ -243,9 +248,8 @@ fn others<'a>(recording: &'a Recording, columns: &Columns<'a>, rows: &std::ops::
             (None, Some((group, axis))) => (group, axis.to_owned()),
             (None, None) => (name.family, String::new()),
         };
-        let same = |other: &&mut Family<'a>| {
-            !line.is_empty() && other.name == family && other.members[0].1.scale.unit == name.scale.unit
-        };
+        let same =
+            |other: &&mut Family<'a>| !line.is_empty() && other.name == family && other.members[0].1.scale.unit == name.scale.unit;
         match families.iter_mut().find(same) {
             Some(family) => family.members.push((line, signal)),
             None => families.push(Family { name: family.to_owned(), members: vec![(line, signal)] }),

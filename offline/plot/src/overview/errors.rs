@@ -31,18 +31,19 @@ pub(super) struct Error {
     /// Shown unit, one value per row, NaN where unknown.
     pub(super) values: Vec<f64>,
     pub(super) unit: &'static str,
+    pub(super) statistics: Statistics,
 }
 
 impl Error {
-    pub(super) fn statistics(&self) -> Statistics {
-        Statistics::of(self.values.iter().copied())
+    fn new(label: &str, kind: Kind, values: Vec<f64>, unit: &'static str) -> Self {
+        let statistics = Statistics::of(values.iter().copied());
+        Self { label: label.to_owned(), kind, values, unit, statistics }
     }
 }
 
 /// Minuend - subtrahend in the unit in which the subtrahend is shown.
 fn difference(label: &str, kind: Kind, from: &Signal<'_>, take: &Signal<'_>) -> Error {
-    let values = from.shown().zip(take.shown()).map(|(a, b)| a - b).collect();
-    Error { label: label.to_owned(), kind, values, unit: take.scale.unit }
+    Error::new(label, kind, from.shown().zip(take.shown()).map(|(a, b)| a - b).collect(), take.scale.unit)
 }
 
 /// The error of a channel that says most, if it has any.
@@ -82,10 +83,8 @@ impl Errors {
         let tip_3d = tip.as_ref().map(length);
         let joints: Vec<(u32, Error)> = content.joints.iter().filter_map(|(number, joint)| Some((*number, of(joint)?))).collect();
         let mut tracked = Vec::new();
-        if let (Some(axes), Some([x, _, _])) = (&content.tip, &tip) {
-            if x.kind != Kind::Tracking {
-                tracked.extend(axes.iter().filter_map(tracking));
-            }
+        if tip.as_ref().is_some_and(|tip| tip[0].kind != Kind::Tracking) {
+            tracked.extend(content.tip.iter().flatten().filter_map(tracking));
         }
         for (number, error) in &joints {
             if error.kind != Kind::Tracking {
@@ -114,5 +113,5 @@ fn tip(axes: &[Channel<'_>; 3]) -> Option<[Error; 3]> {
 
 fn length([x, y, z]: &[Error; 3]) -> Error {
     let values = x.values.iter().zip(&y.values).zip(&z.values).map(|((x, y), z)| (x * x + y * y + z * z).sqrt()).collect();
-    Error { label: "Tip 3D".to_owned(), kind: x.kind, values, unit: x.unit }
+    Error::new("Tip 3D", x.kind, values, x.unit)
 }

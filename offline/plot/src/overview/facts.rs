@@ -7,11 +7,14 @@ use super::errors::{Errors, Kind};
 use super::words::{count, duration, short};
 
 /// Text of the section of loads.
-pub(super) const LOAD: &str = "A cable stretches under load: a slope is compliance, a step at zero play. The grey ground shows where the samples are.";
+pub(super) const LOAD: &str =
+    "A cable stretches under load: a slope is compliance, a step at zero play. The grey ground shows where the samples are.";
 /// Text of the section of directions.
-pub(super) const DIRECTION: &str = "Friction and play leave the error on another branch when the motion turns. One branch: no hysteresis.";
+pub(super) const DIRECTION: &str =
+    "Friction and play leave the error on another branch when the motion turns. One branch: no hysteresis.";
 /// Text of the section of friction.
-pub(super) const FRICTION: &str = "A step at zero velocity is Coulomb friction, a slope viscous friction; gravity and acceleration add the spread.";
+pub(super) const FRICTION: &str =
+    "A step at zero velocity is Coulomb friction, a slope viscous friction; gravity and acceleration add the spread.";
 
 /// Last part of a path.
 pub(super) fn file_name(path: &str) -> String {
@@ -32,11 +35,14 @@ pub(super) fn subtitle(recording: &Recording, content: &Content<'_>) -> String {
     [arms].into_iter().chain(words).collect::<Vec<_>>().join(" · ")
 }
 
-/// Number of true positions: of the tip, or else of the joint that has most.
-fn true_positions(content: &Content<'_>) -> Option<usize> {
-    let frames = |channel: &Channel<'_>| Some(channel.truth.as_ref()?.values.iter().filter(|value| value.is_finite()).count());
-    let tip = content.tip.iter().flatten().filter_map(frames).max().filter(|frames| *frames > 0);
-    tip.or_else(|| content.joints.values().filter_map(frames).max().filter(|frames| *frames > 0))
+/// Times of the true positions: of the tip, or else of the joint that has most.
+fn true_positions(content: &Content<'_>) -> Option<Vec<f64>> {
+    let times = |channel: &Channel<'_>| -> Option<Vec<f64>> {
+        let seen = channel.truth.as_ref()?.values.iter().zip(content.time.iter()).filter(|(value, _)| value.is_finite());
+        Some(seen.map(|(_, t)| *t).collect()).filter(|times: &Vec<f64>| !times.is_empty())
+    };
+    let tip = content.tip.iter().flatten().filter_map(times).max_by_key(Vec::len);
+    tip.or_else(|| content.joints.values().filter_map(times).max_by_key(Vec::len))
 }
 
 /// Large figures at the top.
@@ -50,10 +56,10 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     }
     tile("Rows", count(content.time.len()));
     tile("Columns", count(content.columns));
-    if let Some(frames) = true_positions(content) {
-        let rate_hz = (frames.max(1) - 1) as f64 / (last - first);
-        let words = if content.timed && frames < content.time.len() { format!("{} at {} Hz", count(frames), short(rate_hz)) } else { count(frames) };
-        tile("True positions", words);
+    if let Some(times) = true_positions(content) {
+        let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
+        let rarer = content.timed && times.len() < content.time.len();
+        tile("True positions", if rarer { format!("{} at {} Hz", count(times.len()), short(rate_hz)) } else { count(times.len()) });
     }
     if content.timed {
         let longest = content.time.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
@@ -69,7 +75,11 @@ fn rate(time: &[f64]) -> String {
     intervals.sort_by(f64::total_cmp);
     let (middle, long) = (intervals[last / 2], intervals[last - last / 100]);
     // Bursts: neither the mean nor the median interval is that of the others.
-    if long > 1.8 * middle || middle > 1.8 * mean { format!("{} Hz, uneven", short(1.0 / mean)) } else { format!("{} Hz", short(1.0 / middle)) }
+    if long > 1.8 * middle || middle > 1.8 * mean {
+        format!("{} Hz, uneven", short(1.0 / mean))
+    } else {
+        format!("{} Hz", short(1.0 / middle))
+    }
 }
 
 /// What a reader must not overlook: what is missing, and what is shown in its place.
@@ -86,7 +96,8 @@ pub(super) fn notices(content: &Content<'_>, errors: &Errors) -> Vec<String> {
             "No true position and no pair of commanded and reported positions: no error can be shown.".to_owned()
         });
     } else if kinds.contains(&Kind::TrueCommanded) {
-        notices.push("No reported position beside the true one for some channels: their error is true \u{2212} commanded.".to_owned());
+        notices
+            .push("No reported position beside the true one for some channels: their error is true \u{2212} commanded.".to_owned());
     }
     if has_truth && errors.tip.as_ref().is_some_and(|tip| tip[0].kind == Kind::Tracking) {
         notices.push("The tip has no true position: its error is the tracking error, commanded \u{2212} reported.".to_owned());
@@ -106,7 +117,7 @@ pub(super) fn table(errors: &Errors) -> Option<(Vec<String>, Vec<Vec<String>>)> 
     let rows: Vec<Vec<String>> = errors
         .all()
         .map(|error| {
-            let s = error.statistics();
+            let s = error.statistics;
             let numbers = [s.mean, s.sd, s.rms, s.median, s.p95, s.max].map(short);
             let words = [error.label.clone(), error.kind.words().to_owned(), error.unit.to_owned(), count(s.count)];
             words.into_iter().chain(numbers).collect()
@@ -151,7 +162,8 @@ pub(super) fn reading(content: &Content<'_>, others_drawn: usize) -> Vec<String>
         "Pictures of relations leave the outermost percent of the samples on each side outside the frame; figures in captions and tables count all."
             .to_owned(),
     ];
-    let standing = "Rising and falling: speed above a tenth of its RMS; where no velocity is recorded it comes from the positions over 20 ms.";
+    let standing =
+        "Rising and falling: speed above a tenth of its RMS; where no velocity is recorded it comes from the positions over 20 ms.";
     lines.push(standing.to_owned());
     let missing = missing(content);
     if !missing.is_empty() {

@@ -7,7 +7,7 @@ use super::content::{Channel, Content, Signal};
 use super::errors::{Error, Errors};
 use super::traces::capital;
 use super::words::short;
-use crate::figure::bins::{Summary, along, density, extent, grid, histogram, quantile};
+use crate::figure::bins::{Summary, along, density, extent, grid, histogram, quantile, select};
 use crate::figure::decimate::every;
 use crate::figure::{Axis, Cells, Colour, Figure, Mark, NARROW_PX, Panel, Ramp};
 
@@ -19,15 +19,14 @@ fn least(samples: usize) -> usize {
 }
 
 /// Cells of a density.
-const DENSITY: (usize, usize) = (72, 44);
+const DENSITY: (usize, usize) = (60, 36);
 /// Dots of one colour.
-const DOTS: usize = 700;
+const DOTS: usize = 500;
 
 /// Range that leaves out the outermost percent on each side.
 fn core_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let mut finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    finite.sort_by(f64::total_cmp);
-    let (low, high) = (quantile(&finite, 0.01), quantile(&finite, 0.99));
+    let (low, high) = (select(&mut finite, 0.01), select(&mut finite, 0.99));
     if low < high { (low, high) } else { extent(finite) }
 }
 
@@ -97,7 +96,8 @@ pub(super) fn load(content: &Content<'_>, errors: &Errors) -> Vec<Figure> {
             if samples.len() < 20 {
                 continue;
             }
-            let title = if what == joint.label { what.to_owned() } else { format!("{what} over load of {}", joint.label.to_lowercase()) };
+            let title =
+                if what == joint.label { what.to_owned() } else { format!("{what} over load of {}", joint.label.to_lowercase()) };
             let figure = Figure::new(title, Axis::new(load.scale.titled(name)));
             let caption = format!("Correlation {}. Band: 5 to 95 % of the samples.", short(correlation(&samples)));
             figures.push(scattered(figure, &error_title(error), &samples).caption(caption));
@@ -164,8 +164,7 @@ fn branches(content: &Content<'_>, channel: &Channel<'_>, error: &Error) -> Opti
 }
 
 fn parted(up: &[Summary], down: &[Summary], unit: &str) -> String {
-    let gaps: Vec<f64> =
-        up.iter().filter_map(|a| Some(a.middle - down.iter().find(|b| b.x == a.x)?.middle)).collect();
+    let gaps: Vec<f64> = up.iter().filter_map(|a| Some(a.middle - down.iter().find(|b| b.x == a.x)?.middle)).collect();
     if gaps.is_empty() {
         return "Medians over position; the directions share no position.".to_owned();
     }
@@ -203,16 +202,23 @@ fn map((a, b): (&Signal<'_>, &Signal<'_>), names: (&str, &str), error: &Error) -
         let (x, y) = (format!("{} {}", short(x), a.scale.unit), format!("{} {}", short(y), b.scale.unit));
         format!("Most: {} {} around {x}, {y}.", short(value), error.unit)
     });
-    let title = if error.label == "Tip 3D" { "3D error of the tip".to_owned() } else { format!("Error of {}", error.label.to_lowercase()) };
+    let title =
+        if error.label == "Tip 3D" { "3D error of the tip".to_owned() } else { format!("Error of {}", error.label.to_lowercase()) };
     // One cell with an outlier must not take all the colours.
     let mut sizes: Vec<f64> = cells.values.iter().copied().filter(|value| value.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     let (low, high) = (quantile(&sizes, 0.02), quantile(&sizes, 0.98));
     cells.values.iter_mut().filter(|value| value.is_finite()).for_each(|value| *value = value.clamp(low, high));
-    let panel = Panel::new(Axis::new(b.scale.titled(names.1)).range(y.0, y.1))
-        .height(230.0)
-        .mark(Mark::Cells { cells, ramp: Ramp::Heat, title: format!("Mean size, {}", error.unit) });
-    let caption = format!("{} {visited} of {} cells visited; blank where fewer than 2 samples are. Colours end at the 2nd and 98th percentile.", worst, MAP.0 * MAP.1);
+    let panel = Panel::new(Axis::new(b.scale.titled(names.1)).range(y.0, y.1)).height(230.0).mark(Mark::Cells {
+        cells,
+        ramp: Ramp::Heat,
+        title: format!("Mean size, {}", error.unit),
+    });
+    let caption = format!(
+        "{} {visited} of {} cells visited; blank where fewer than 2 samples are. Colours end at the 2nd and 98th percentile.",
+        worst,
+        MAP.0 * MAP.1
+    );
     Some(Figure::new(title, Axis::new(a.scale.titled(names.0)).range(x.0, x.1)).panel(panel).caption(caption))
 }
 
@@ -231,7 +237,10 @@ const HISTOGRAM: usize = 48;
 pub(super) fn distribution(errors: &Errors) -> Vec<Figure> {
     let tip = errors.tip.as_ref().map(|tip| {
         let names = ["x", "y", "z"];
-        spread("Tip", &tip.iter().zip(names).enumerate().map(|(i, (error, name))| (name, error, Colour::choice(i))).collect::<Vec<_>>())
+        spread(
+            "Tip",
+            &tip.iter().zip(names).enumerate().map(|(i, (error, name))| (name, error, Colour::choice(i))).collect::<Vec<_>>(),
+        )
     });
     let joints = errors.joints.iter().map(|(_, error)| spread(&error.label, &[("", error, Colour::BLUE)]));
     tip.into_iter().chain(joints).collect()
@@ -249,12 +258,17 @@ fn spread(title: &str, parts: &[(&str, &Error, Colour)]) -> Figure {
     let each: Vec<String> = parts
         .iter()
         .map(|(name, error, _)| {
-            let (statistics, gap) = (error.statistics(), if name.is_empty() { "" } else { ": " });
+            let (statistics, gap) = (error.statistics, if name.is_empty() { "" } else { ": " });
             format!("{name}{gap}mean {}, SD {}", short(statistics.mean), short(statistics.sd))
         })
         .collect();
-    let axis = if range.0 < range.1 { Axis::new(error_title(error)).range(range.0, range.1) } else { Axis::new(error_title(error)) };
-    Figure::new(title, axis).width(NARROW_PX).panel(panel).caption(format!("{} {}.", if parts.len() > 1 { each.join("; ") } else { capital(&each[0]) }, error.unit))
+    let axis =
+        if range.0 < range.1 { Axis::new(error_title(error)).range(range.0, range.1) } else { Axis::new(error_title(error)) };
+    Figure::new(title, axis).width(NARROW_PX).panel(panel).caption(format!(
+        "{} {}.",
+        if parts.len() > 1 { each.join("; ") } else { capital(&each[0]) },
+        error.unit
+    ))
 }
 
 /// Load against velocity: Coulomb friction is a step at zero, viscous friction a slope.
@@ -265,7 +279,8 @@ pub(super) fn friction(content: &Content<'_>) -> Vec<Figure> {
             let ((name, load), velocity) = (channel.load.as_ref()?, channel.velocity.as_ref()?);
             let samples = finite_pairs(velocity.shown(), load.shown());
             let figure = Figure::new(&channel.label, Axis::new(velocity.scale.titled("Velocity")));
-            (samples.len() >= 20).then(|| scattered(figure, &load.scale.titled(name), &samples).caption("Band: 5 to 95 % of the samples."))
+            (samples.len() >= 20)
+                .then(|| scattered(figure, &load.scale.titled(name), &samples).caption("Band: 5 to 95 % of the samples."))
         })
         .collect()
 }

@@ -44,9 +44,10 @@ fn channel(content: &Content<'_>, channel: &Channel<'_>) -> Option<Figure> {
     let Some(error) = of(channel) else { return Some(figure.caption(missing(channel))) };
     let mark = line(content, error.values.iter().copied(), "", error_colour(error.kind), columns);
     let title = format!("{}, {}", capital(error.kind.words()), error.unit);
-    let statistics = error.statistics();
+    let statistics = error.statistics;
     let below = Panel::new(Axis::new(title).including(0.0)).height(70.0).mark(Mark::Rule { y: 0.0 }).mark(mark);
-    let caption = format!("{}: mean {} {}, {}.", error.kind.words(), short(statistics.mean), error.unit, sizes(&statistics, error.unit));
+    let caption =
+        format!("{}: mean {} {}, {}.", error.kind.words(), short(statistics.mean), error.unit, sizes(&statistics, error.unit));
     Some(figure.panel(below).caption(capital(&caption)))
 }
 
@@ -117,26 +118,25 @@ pub(super) fn errors(content: &Content<'_>, errors: &Errors, width_px: f64) -> O
     let mut figure = Figure::new(format!("Error over time: {}", kind.words()), time_axis(content)).width(width_px);
     let columns = figure.columns_px();
     for error in chosen.iter().take(ERROR_PANELS) {
-        let statistics = error.statistics();
+        let statistics = error.statistics;
         let title = format!("{}, {}", error.label, error.unit);
         let note = format!("RMS {}  p95 {}  max {}", short(statistics.rms), short(statistics.p95), short(statistics.max));
         let colour = if error.label == "Tip 3D" { Colour::INK } else { error_colour(error.kind) };
         let mark = line(content, error.values.iter().copied(), "", colour, columns).style("thin");
-        figure = figure.panel(Panel::new(Axis::new(title).including(0.0)).height(86.0).mark(Mark::Rule { y: 0.0 }).mark(mark).note(note));
+        figure = figure
+            .panel(Panel::new(Axis::new(title).including(0.0)).height(86.0).mark(Mark::Rule { y: 0.0 }).mark(mark).note(note));
     }
-    let caption = match &errors.tip_3d {
-        Some(length) => {
-            let statistics = length.statistics();
-            let per_axis: Vec<String> = errors.tip.iter().flatten().map(|error| short(error.statistics().rms)).collect();
-            format!(
-                "3D error: {} in {} samples. RMS per axis x, y, z: {} {}.",
-                sizes(&statistics, length.unit),
-                statistics.count,
-                per_axis.join(", "),
-                length.unit
-            )
-        }
-        None => chosen.iter().take(ERROR_PANELS).map(|e| format!("{}: {}. ", e.label, sizes(&e.statistics(), e.unit))).collect(),
-    };
-    Some(figure.caption(caption.trim_end()))
+    Some(figure.caption(errors.tip_3d.as_ref().map_or_else(|| each(&chosen), |length| of_tip(errors, length))))
+}
+
+fn each(errors: &[&Error]) -> String {
+    let one = |error: &&Error| format!("{}: {}.", error.label, sizes(&error.statistics, error.unit));
+    errors.iter().take(ERROR_PANELS).map(one).collect::<Vec<_>>().join(" ")
+}
+
+fn of_tip(errors: &Errors, length: &Error) -> String {
+    let (statistics, unit) = (&length.statistics, length.unit);
+    let per_axis: Vec<String> = errors.tip.iter().flatten().map(|error| short(error.statistics.rms)).collect();
+    let (sizes, count, per_axis) = (sizes(statistics, unit), statistics.count, per_axis.join(", "));
+    format!("3D error: {sizes} in {count} samples. RMS per axis x, y, z: {per_axis} {unit}.")
 }

@@ -104,9 +104,40 @@ impl<'a> Cells<'a> {
 
     /// A number, or the column that is not one.
     pub(crate) fn number(&mut self) -> Result<f64, Bad> {
-        let column = self.taken;
-        let cell = self.next().ok_or_else(|| Bad::column(column, "is missing"))?;
-        text::number(cell).ok_or_else(|| Bad::column(column, format_args!("is not a number but {}", shown(cell))))
+        let rest = self.rest.unwrap_or_default();
+        self.taken(if self.commas { text::number_of_cell(rest, is_comma) } else { text::number_of_cell(rest, is_blank) })
+    }
+
+    /// A number, rounded once to a single.
+    fn single(&mut self) -> Result<f32, Bad> {
+        let rest = self.rest.unwrap_or_default();
+        self.taken(if self.commas { text::single_of_cell(rest, is_comma) } else { text::single_of_cell(rest, is_blank) })
+    }
+
+    /// Goes on behind a number.
+    fn taken<T>(&mut self, (number, end): (Option<T>, usize)) -> Result<T, Bad> {
+        let Some(rest) = self.rest else {
+            return Err(Bad::column(self.taken, "is missing"));
+        };
+        let Some(number) = number else {
+            return Err(Bad::column(self.taken, format_args!("is not a number but {}", shown(rest[..end].trim_ascii()))));
+        };
+        self.pass(rest, end);
+        Ok(number)
+    }
+
+    /// Goes on behind a cell.
+    fn pass(&mut self, rest: &'a [u8], end: usize) {
+        self.taken += 1;
+        self.rest = rest.get(end + 1..);
+        if !self.commas {
+            self.rest = self.rest.map(<[u8]>::trim_ascii_start);
+        }
+    }
+
+    /// Is there another cell?
+    pub(crate) fn more(&self) -> bool {
+        self.rest.is_some()
     }
 
     /// The cell of a time stamp, ns; none for NaN.
@@ -135,25 +166,19 @@ impl<'a> Iterator for Cells<'a> {
 
     fn next(&mut self) -> Option<&'a [u8]> {
         let rest = self.rest?;
-        let end = if self.commas {
-            rest.iter().position(|byte| *byte == b',')
-        } else {
-            rest.iter().position(|byte| matches!(byte, b' ' | b'\t'))
-        };
-        let cell = match end {
-            Some(end) => {
-                let after = &rest[end + 1..];
-                self.rest = Some(if self.commas { after } else { after.trim_ascii_start() });
-                &rest[..end]
-            }
-            None => {
-                self.rest = None;
-                rest
-            }
-        };
-        self.taken += 1;
+        let end = rest.iter().position(|byte| if self.commas { is_comma(*byte) } else { is_blank(*byte) }).unwrap_or(rest.len());
+        self.pass(rest, end);
+        let cell = &rest[..end];
         Some(cell.trim_ascii())
     }
+}
+
+fn is_comma(byte: u8) -> bool {
+    byte == b','
+}
+
+fn is_blank(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t')
 }
 
 /// Foreign bytes in a message: short, and harmless to a terminal.
@@ -178,7 +203,7 @@ pub(crate) fn put(fields: &[&Field], cells: &mut Cells<'_>, state: &mut RavenSta
             }
             ValuesMut::Float(values) => {
                 for value in values {
-                    *value = cells.number()? as f32;
+                    *value = cells.single()?;
                 }
             }
         }
@@ -192,8 +217,8 @@ pub(crate) fn splice(
     state: &RavenState,
     out: &mut Vec<u8>,
     separator: u8,
-    int: fn(&mut Vec<u8>, i32),
-    float: fn(&mut Vec<u8>, f32),
+    int: impl Fn(&mut Vec<u8>, i32),
+    float: impl Fn(&mut Vec<u8>, f32),
 ) {
     for field in fields {
         match (field.get)(state) {

@@ -48,13 +48,8 @@ impl Reader {
     }
 
     pub(crate) fn new(path: &Path, input: Input) -> Result<Self, StreamError> {
-        let mut reader = Self {
-            rows: Rows::new(path, input),
-            timeline: Timeline::default(),
-            metadata: metadata(),
-            arms: 0,
-            first: None,
-        };
+        let mut reader =
+            Self { rows: Rows::new(path, input), timeline: Timeline::default(), metadata: metadata(), arms: 0, first: None };
         reader.first = reader.row()?;
         Ok(reader)
     }

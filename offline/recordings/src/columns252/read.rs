@@ -81,7 +81,8 @@ impl Reader {
             row_of(line, timeline)
         })?;
         if let Some(first) = &reader.first {
-            reader.side = side.or(Some(if first.state.type_[0] == 0 && first.state.type_[1] != 0 { Side::Green } else { Side::Gold }));
+            reader.side =
+                side.or(Some(if first.state.type_[0] == 0 && first.state.type_[1] != 0 { Side::Green } else { Side::Gold }));
         }
         reader.metadata = metadata(reader.side.unwrap_or(Side::Gold), with_force);
         Ok(reader)
@@ -161,11 +162,10 @@ fn metadata(side: Side, with_force: bool) -> Vec<(String, String)> {
 }
 
 pub(super) fn row_of(line: &[u8], timeline: &mut Timeline) -> Result<Row, Bad> {
-    let mut cells = Cells::new(line);
-    parse(line, &mut cells, timeline).map_err(|bad| judged(line, bad))
+    parse(&mut Cells::new(line), timeline).map_err(|bad| judged(line, bad))
 }
 
-fn parse(line: &[u8], cells: &mut Cells<'_>, timeline: &mut Timeline) -> Result<Row, Bad> {
+fn parse(cells: &mut Cells<'_>, timeline: &mut Timeline) -> Result<Row, Bad> {
     let mut state = Box::new(RavenState::new());
     let since_start = cells.nanoseconds()?;
     let joints = [cells.number()?, cells.number()?, cells.number()?];
@@ -175,7 +175,7 @@ fn parse(line: &[u8], cells: &mut Cells<'_>, timeline: &mut Timeline) -> Result<
     }
     let stamp = cells.nanoseconds()?.ok_or_else(|| Bad::column(12, "is no time"))?;
     columns::put(&COLUMNS_252, cells, &mut state)?;
-    if Cells::count_of(line) == COLUMNS_WITH_FORCE {
+    if cells.more() {
         cells.nanoseconds()?;
         for _ in 1..FORCE {
             cells.number()?;

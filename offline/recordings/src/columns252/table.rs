@@ -6,7 +6,7 @@ use super::read::row_of;
 use super::{COLUMNS, COLUMNS_WITH_FORCE};
 use crate::columns::{Bad, Cells, Rows, Timeline};
 use crate::fields::COLUMNS_252;
-use crate::file::Input;
+use crate::file::{Input, InputProblem};
 use crate::stream::{Damage, StreamError};
 use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
 use crate::text;
@@ -28,7 +28,18 @@ impl Table {
     /// # Errors
     /// [`StreamError`] if it cannot be opened, is empty, or its first row is not one of this layout.
     pub fn open(path: &Path) -> Result<Self, StreamError> {
-        let input = Input::open(path).map_err(|problem| problem.refusal(path))?;
+        Self::new(path, Input::open(path).map_err(|problem| problem.refusal(path))?)
+    }
+
+    /// The same from memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub fn from_bytes(name: &Path, bytes: Vec<u8>) -> Result<Self, StreamError> {
+        Self::new(name, Input::from_bytes(bytes).map_err(|error| InputProblem::Read(error).refusal(name))?)
+    }
+
+    fn new(path: &Path, input: Input) -> Result<Self, StreamError> {
         let mut table =
             Self { rows: Rows::new(path, input), columns: Vec::new(), metadata: Vec::new(), first: None, start_ns: None };
         let mut count = COLUMNS;
@@ -66,12 +77,11 @@ impl TableSource for Table {
         batch.clear();
         while batch.rows() < BATCH_ROWS {
             let count = self.columns.len() - 1;
-            let row = match self.first.take() {
-                Some(first) => Some(first),
-                None => {
-                    let Self { rows, start_ns, .. } = self;
-                    rows.next(|line| numbers(line, count, start_ns))?
-                }
+            let row = if let Some(first) = self.first.take() {
+                Some(first)
+            } else {
+                let Self { rows, start_ns, .. } = self;
+                rows.next(|line| numbers(line, count, start_ns))?
             };
             let Some(row) = row else { break };
             for (cells, value) in batch.columns.iter_mut().zip(row) {

@@ -6,7 +6,7 @@ use crate::file::Lines;
 
 /// Reads the further lines of a row in which a quoted cell goes over several.
 pub(super) fn complete_row(lines: &mut Lines) -> Result<(), String> {
-    while lines.line().iter().filter(|byte| **byte == b'"').count() % 2 == 1 {
+    while lines.line().split(|byte| *byte == b'"').count() % 2 == 0 {
         if !lines.append().map_err(|problem| problem.what())? {
             return Err("a quoted cell is not closed before the end of the file".to_owned());
         }
@@ -35,6 +35,11 @@ impl<'a> Split<'a> {
         Self { rest: Some(row), quoted: row.contains('"') }
     }
 
+    /// Are there quotes in the row?
+    pub(super) fn is_quoted(&self) -> bool {
+        self.quoted
+    }
+
     /// The cells of a row that must have so many; one empty cell too many (a comma at the end) is passed over.
     pub(super) fn of(row: &'a str, expected: usize) -> Result<Self, String> {
         let split = Self::all(row);
@@ -58,12 +63,9 @@ impl<'a> Iterator for Split<'a> {
             self.rest = after;
             return Some(cell);
         }
-        let (cell, after) = match rest.split_once(',') {
-            Some((cell, after)) => (cell, Some(after)),
-            None => (rest, None),
-        };
-        self.rest = after;
-        Some(Cow::Borrowed(cell.trim()))
+        let end = rest.bytes().position(|byte| byte == b',').unwrap_or(rest.len());
+        self.rest = rest.get(end + 1..);
+        Some(Cow::Borrowed(rest[..end].trim()))
     }
 }
 

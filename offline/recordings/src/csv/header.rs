@@ -106,7 +106,8 @@ pub(crate) fn loose_fields(names: &[&str]) -> Vec<Field> {
     let mut fields: Vec<Field> = Vec::with_capacity(names.len());
     for name in names {
         let found = field(name, origin_names).unwrap_or_else(|_| unknown(name));
-        let is_taken = found.name != *name && (names.contains(&found.name.as_str()) || fields.iter().any(|other| other.name == found.name));
+        let is_taken =
+            found.name != *name && (names.contains(&found.name.as_str()) || fields.iter().any(|other| other.name == found.name));
         fields.push(if is_taken { unknown(name) } else { found });
     }
     fields

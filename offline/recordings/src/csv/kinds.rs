@@ -6,7 +6,7 @@ use crate::table::TableColumn;
 use crate::text;
 
 /// Text that is looked at to tell words from numbers, bytes.
-const PROBE_BYTES: usize = 16 << 20;
+const PROBE_BYTES: usize = 4 << 20;
 
 /// A column is one of words if at least one in so many of its cells is no number; fewer are damage.
 const WORDS_ONE_IN: u64 = 10;
@@ -17,8 +17,14 @@ const EXACT_MAX: f64 = 9_007_199_254_740_992.0;
 /// A number that a double holds as it is written, none for anything else. A long whole number (nanoseconds since 1970) that
 /// would be changed is no number here.
 fn exact(cell: &str) -> Option<f64> {
-    let value = text::number(cell.as_bytes())?;
-    if value.abs() >= EXACT_MAX && value.is_finite() && cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-' || byte == b'+') {
+    text::number(cell.as_bytes()).and_then(|value| unchanged(cell, value))
+}
+
+fn unchanged(cell: &str, value: f64) -> Option<f64> {
+    if value.abs() >= EXACT_MAX
+        && value.is_finite()
+        && cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-' || byte == b'+')
+    {
         let same = cell.parse::<i128>().is_ok_and(|whole| whole as f64 == value && value as i128 == whole);
         return same.then_some(value);
     }
@@ -70,6 +76,14 @@ impl Kinds {
     /// The row that follows stands on this line.
     pub(super) fn row(&mut self, line: u64) {
         self.line = line;
+    }
+
+    /// The number in the cell that the text begins with, and where the cell ends, as [`Kinds::number`].
+    pub(super) fn number_of_cell(&mut self, place: usize, text: &str) -> (f64, usize) {
+        match text::number_of_cell(text.as_bytes(), |byte| byte == b',') {
+            (Some(value), end) if value.abs() < EXACT_MAX => (value, end),
+            (_, end) => (self.number(place, text[..end].trim()), end),
+        }
     }
 
     /// The number in a cell; NaN for an empty one and for what is no number.

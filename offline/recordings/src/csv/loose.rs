@@ -27,7 +27,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Opens a file, compressed or not. Its first 16 MiB of text are read twice: what they hold decides which columns are
+    /// Opens a file, compressed or not. Its first 4 MiB of text are read twice: what they hold decides which columns are
     /// words.
     ///
     /// # Errors
@@ -61,16 +61,7 @@ impl Table {
         let mut head = Head { path: path.to_owned(), metadata: Vec::new() };
         let names = head.names(&mut lines)?;
         let (columns, findings) = distinct(names);
-        Ok(Self {
-            lines,
-            columns,
-            metadata: head.metadata,
-            findings,
-            damage: None,
-            done: false,
-            comments: 0,
-            kinds: Kinds::new(0),
-        })
+        Ok(Self { lines, columns, metadata: head.metadata, findings, damage: None, done: false, comments: 0, kinds: Kinds::new(0) })
     }
 
     /// Appends a row to the batch; false at the end or at the damage.
@@ -85,15 +76,40 @@ impl Table {
             self.comments += 1;
         }
         cells::complete_row(&mut self.lines)?;
-        let split = Split::of(cells::row_text(&self.lines)?, self.columns.len())?;
+        let row = cells::row_text(&self.lines)?;
+        let split = Split::of(row, self.columns.len())?;
         self.kinds.row(self.lines.number());
-        for (place, (cell, to)) in split.zip(&mut batch.columns).enumerate() {
-            match to {
-                ColumnCells::Numbers(values) => values.push(self.kinds.number(place, &cell)),
-                ColumnCells::Texts(texts) => texts.push(&cell),
+        if split.is_quoted() {
+            for (place, (cell, to)) in split.zip(&mut batch.columns).enumerate() {
+                match to {
+                    ColumnCells::Numbers(values) => values.push(self.kinds.number(place, &cell)),
+                    ColumnCells::Texts(texts) => texts.push(&cell),
+                }
             }
+        } else {
+            plain_row(row, &mut self.kinds, batch);
         }
         Ok(true)
+    }
+}
+
+/// Cells of a row without quotes, which has as many as there are columns.
+fn plain_row(row: &str, kinds: &mut Kinds, batch: &mut Batch) {
+    let mut rest = row;
+    for (place, to) in batch.columns.iter_mut().enumerate() {
+        let end = match to {
+            ColumnCells::Numbers(values) => {
+                let (value, end) = kinds.number_of_cell(place, rest);
+                values.push(value);
+                end
+            }
+            ColumnCells::Texts(texts) => {
+                let end = rest.bytes().position(|byte| byte == b',').unwrap_or(rest.len());
+                texts.push(rest[..end].trim());
+                end
+            }
+        };
+        rest = rest.get(end + 1..).unwrap_or("");
     }
 }
 
@@ -180,9 +196,8 @@ impl Head {
         }
         let number = lines.number();
         let names = cells::complete_row(lines).and_then(|()| cells::row_text(lines));
-        let names = names.map_err(|what| {
-            refusal(&self.path, Some(Place::Line(number)), what, "is this a CSV file? save it as UTF-8 text")
-        })?;
+        let names = names
+            .map_err(|what| refusal(&self.path, Some(Place::Line(number)), what, "is this a CSV file? save it as UTF-8 text"))?;
         let names: Vec<String> = Split::all(names).map(Cow::into_owned).collect();
         let names_as_text: Vec<&str> = names.iter().map(String::as_str).collect();
         super::check_names(&names_as_text).map_err(|problem| self.problem(Some(lines.number()), &problem))?;

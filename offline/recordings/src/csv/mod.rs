@@ -95,12 +95,7 @@ impl<'a> Reader<'a> {
             return Err(self.whole_file(CsvProblem::NoRows));
         }
         recording.columns = std::iter::zip(fields.into_iter().zip(&names), values)
-            .map(|((field, name), values)| Column {
-                name: field.name,
-                known: field.known,
-                values,
-                original: (*name).to_owned(),
-            })
+            .map(|((field, name), values)| Column { name: field.name, known: field.known, values, original: (*name).to_owned() })
             .collect();
         Ok(recording)
     }

@@ -120,7 +120,7 @@ const WORD_CHARS: usize = 60;
 /// Collects words.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Words {
-    words: Vec<Word>,
+    seen: Vec<Word>,
     others: u64,
     count: u64,
     missing: u64,
@@ -135,10 +135,10 @@ impl Words {
         self.count += 1;
         let end = text.char_indices().nth(WORD_CHARS).map_or(text.len(), |(end, _)| end);
         let text = &text[..end];
-        let has_room = self.words.len() < WORDS_MAX;
-        match self.words.iter_mut().find(|word| word.text == text) {
+        let has_room = self.seen.len() < WORDS_MAX;
+        match self.seen.iter_mut().find(|word| word.text == text) {
             Some(word) => word.count += 1,
-            None if has_room => self.words.push(Word { text: text.to_owned(), count: 1 }),
+            None if has_room => self.seen.push(Word { text: text.to_owned(), count: 1 }),
             None => self.others += 1,
         }
     }
@@ -154,8 +154,8 @@ impl Words {
             max: None,
             first: None,
             last: None,
-            constant: self.count > 1 && self.missing == 0 && self.words.len() == 1,
-            words: self.words,
+            constant: self.count > 1 && self.missing == 0 && self.seen.len() == 1,
+            words: self.seen,
             other_words: self.others,
         }
     }

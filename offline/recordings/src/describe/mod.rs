@@ -155,11 +155,7 @@ pub fn of_states(name: &str, source: &mut dyn Source, progress: &mut dyn FnMut(u
 ///
 /// # Errors
 /// [`StreamError`] of the source.
-pub fn of_table(
-    name: &str,
-    source: &mut dyn TableSource,
-    progress: &mut dyn FnMut(u64, u64),
-) -> Result<Description, StreamError> {
+pub fn of_table(name: &str, source: &mut dyn TableSource, progress: &mut dyn FnMut(u64, u64)) -> Result<Description, StreamError> {
     table::describe(name, source, progress)
 }
 

@@ -135,7 +135,10 @@ fn show_stream(f: &mut Formatter<'_>, stream: &Stream) -> fmt::Result {
     let median = short(timing.median_spacing_s * 1e3);
     if timing.is_irregular() {
         let mean = short(timing.mean_rate_hz);
-        writeln!(f, "irregular: {mean} Hz on average\n  {off} of the spacings are off their median of {median} ms by more than half")?;
+        writeln!(
+            f,
+            "irregular: {mean} Hz on average\n  {off} of the spacings are off their median of {median} ms by more than half"
+        )?;
     } else {
         writeln!(f, "{} Hz\n  {off} of the spacings are off their median of {median} ms by more than half", short(timing.rate_hz))?;
     }

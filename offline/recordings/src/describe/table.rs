@@ -44,7 +44,11 @@ impl Meaning {
         let dac = places(&|name| limit(name).is_some()).into_iter().map(|place| (place, limit(&fields[place].0).unwrap_or(0)));
         let (speeds, rule) = speeds(&fields, &places);
         let first_of = |kinds: &[&str]| -> Vec<usize> {
-            kinds.iter().map(|kind| places(&|name| numbered(name, kind).is_some())).find(|places| !places.is_empty()).unwrap_or_default()
+            kinds
+                .iter()
+                .map(|kind| places(&|name| numbered(name, kind).is_some()))
+                .find(|places| !places.is_empty())
+                .unwrap_or_default()
         };
         let any_of = |name: &str, parts: &[&str]| parts.iter().any(|part| name.contains(part));
         Self {
@@ -71,8 +75,11 @@ fn numbered(name: &str, kind: &str) -> Option<usize> {
     (!unit.is_empty()).then(|| number.parse().ok()).flatten()
 }
 
+/// Finds the columns whose name passes a test.
+type Places<'a> = dyn Fn(&dyn Fn(&str) -> bool) -> Vec<usize> + 'a;
+
 /// Columns of speed with the size, in the unit of the file, below which they stand; and the rule in words.
-fn speeds(fields: &[(String, f64)], places: &dyn Fn(&dyn Fn(&str) -> bool) -> Vec<usize>) -> (Vec<(usize, f64)>, String) {
+fn speeds(fields: &[(String, f64)], places: &Places<'_>) -> (Vec<(usize, f64)>, String) {
     for (kind, turning) in [("mvel", MOTOR_STILL_RAD_S), ("dq", JOINT_STILL_RAD_S), ("jvel", JOINT_STILL_RAD_S)] {
         let found = places(&|name| numbered(name, kind).is_some());
         if found.is_empty() {
@@ -96,7 +103,7 @@ struct Rows {
     meaning: Meaning,
     cells: Vec<Cells>,
     times: Times,
-    rows: u64,
+    count: u64,
     repeated: u64,
     before: Vec<f64>,
     before_words: Vec<String>,
@@ -111,13 +118,14 @@ struct Rows {
 impl Rows {
     fn new(columns: &[TableColumn]) -> Self {
         let meaning = Meaning::of(columns);
-        let cells = |column: &TableColumn| if column.text { Cells::Words(Words::default()) } else { Cells::Numbers(Numbers::default()) };
+        let cells =
+            |column: &TableColumn| if column.text { Cells::Words(Words::default()) } else { Cells::Numbers(Numbers::default()) };
         Self {
             at_limit: vec![0; meaning.dac.len()],
             meaning,
             cells: columns.iter().map(cells).collect(),
             times: Times::default(),
-            rows: 0,
+            count: 0,
             repeated: 0,
             before: Vec::new(),
             before_words: Vec::new(),
@@ -167,7 +175,7 @@ impl Rows {
     }
 
     fn see_row(&mut self, row: &[f64]) {
-        self.rows += 1;
+        self.count += 1;
         if let Some(time) = self.meaning.time {
             match nanoseconds(row[time]) {
                 Some(time_ns) => self.times.see(time_ns),
@@ -231,14 +239,14 @@ fn result(name: &str, source: &dyn TableSource, rows: Rows) -> Description {
     let saturation = rows.meaning.dac.iter().zip(&rows.at_limit).map(|((place, limit), count)| Saturation {
         channel: source.columns()[*place].name.clone(),
         limit_counts: *limit,
-        share: share(*count, rows.rows),
+        share: share(*count, rows.count),
         at_extreme_share: match &rows.cells[*place] {
-            Cells::Numbers(numbers) => share(numbers.at_extremes(), rows.rows),
+            Cells::Numbers(numbers) => share(numbers.at_extremes(), rows.count),
             Cells::Words(_) => 0.0,
         },
     });
     let saturation = saturation.collect();
-    let [position_share, rotation_share, joints_share] = rows.truth.map(|count| share(count, rows.rows));
+    let [position_share, rotation_share, joints_share] = rows.truth.map(|count| share(count, rows.count));
     let has_truth = rows.meaning.truth.iter().any(|places| !places.is_empty());
     let truth = TruthCoverage { arm: String::new(), position_share, rotation_share, joints_share };
     let standstill = rows.tells_standstill().then(|| rows.still.result("", &rows.meaning.rule));
@@ -253,12 +261,12 @@ fn result(name: &str, source: &dyn TableSource, rows: Rows) -> Description {
         bytes: source.progress().1,
         metadata: source.metadata().to_vec(),
         topics: Vec::new(),
-        streams: vec![Stream { name: "rows".to_owned(), count: rows.rows, timing }],
+        streams: vec![Stream { name: "rows".to_owned(), count: rows.count, timing }],
         channels: rows.cells.into_iter().zip(source.columns()).map(channel).collect(),
         repeated_rows: rows.repeated,
         standstill: standstill.into_iter().collect(),
         saturation,
-        runlevels: rows.runlevels.shares(rows.rows),
+        runlevels: rows.runlevels.shares(rows.count),
         truth: has_truth.then_some(truth).into_iter().collect(),
         findings,
         damage: source.damage().map(DamageAt::from),

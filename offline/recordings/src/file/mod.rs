@@ -27,15 +27,9 @@ impl InputProblem {
     /// The same as a line about a file.
     pub(crate) fn refusal(&self, file: &Path) -> StreamError {
         match self {
-            Self::Open(error) => {
-                refusal(file, None, format!("cannot be opened ({error})"), "check the path and its permissions")
-            }
-            Self::Read(error) => {
-                refusal(file, None, format!("cannot be read ({error})"), "check the disk or copy the file again")
-            }
-            Self::NotGzip => {
-                refusal(file, None, "is named .gz but is not gzip", "rename it without .gz or compress it")
-            }
+            Self::Open(error) => refusal(file, None, format!("cannot be opened ({error})"), "check the path and its permissions"),
+            Self::Read(error) => refusal(file, None, format!("cannot be read ({error})"), "check the disk or copy the file again"),
+            Self::NotGzip => refusal(file, None, "is named .gz but is not gzip", "rename it without .gz or compress it"),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::records::{ChannelRecord, MessageRecord, Schema};
-use crate::ros::{Assembler, CHANNELS_MAX, KnownChannel, Stop, TEXT_MAX, admit_encoding};
+use crate::ros::{Assembler, CHANNELS_MAX, KnownChannel, StateTopic, Stop, TEXT_MAX, admit_encoding};
 use crate::stream::Channel;
 
 /// What is known so far.
@@ -11,6 +11,7 @@ use crate::stream::Channel;
 pub(super) struct Channels {
     schemas: HashMap<u16, Schema>,
     known: BTreeMap<u16, (ChannelRecord, KnownChannel)>,
+    state_topic: StateTopic,
     /// Text that is kept, bytes.
     text_bytes: usize,
 }
@@ -59,7 +60,7 @@ impl Channels {
         channel.take(assembler, message.log_time_ns, message.data, at)
     }
 
-    fn open(&self, record: &ChannelRecord, at: u64) -> Result<KnownChannel, Stop> {
+    fn open(&mut self, record: &ChannelRecord, at: u64) -> Result<KnownChannel, Stop> {
         let (topic, encoding) = (record.topic.clone(), record.encoding.clone());
         let schema = self.schemas.get(&record.schema_id);
         // Schema 0 is none.
@@ -78,7 +79,7 @@ impl Channels {
             return Ok(KnownChannel::other(topic, name.to_owned(), encoding));
         }
         admit_encoding(&topic, name, schema_encoding).map_err(foreign)?;
-        KnownChannel::ros1(topic, name.to_owned(), text, at)
+        KnownChannel::ros1(topic, name.to_owned(), text, at, &mut self.state_topic)
     }
 
     /// Counts text that is kept for good.

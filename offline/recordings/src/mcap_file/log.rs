@@ -46,6 +46,16 @@ impl McapLog {
         &self.part
     }
 
+    /// Appends a record under a log time of its own, ns since 1970: one clock for all that a logger hears, whatever clock the
+    /// record's own stamp is from.
+    ///
+    /// # Errors
+    /// [`StreamError`] as [`Sink::write`].
+    pub fn write_at(&mut self, record: &Record, time_ns: u64) -> Result<(), StreamError> {
+        let written = self.body.write_at(record, Some(time_ns));
+        written.and_then(|()| self.written(Instant::now())).map_err(|trouble| self.failed(&trouble))
+    }
+
     /// Adds a channel with ROS 1 messages of any type.
     ///
     /// # Errors

@@ -71,13 +71,13 @@ impl<R: Read> McapSource<R> {
         Ok(source)
     }
 
-    /// Reads one record, of the file or of the chunk at hand. Damage ends the stream here.
+    /// Reads one record, of the file or of the chunk at hand. Damage and errors end the stream here.
     fn advance(&mut self) -> Result<(), StreamError> {
         let stopped = if self.chunk.is_empty() { self.outer() } else { self.inner() };
         let Err(stop) = stopped else { return Ok(()) };
-        self.damage = Some(settle(&self.path, stop)?);
         self.chunk.clear();
         self.end();
+        self.damage = Some(settle(&self.path, stop)?);
         Ok(())
     }
 
@@ -106,6 +106,8 @@ impl<R: Read> McapSource<R> {
                 self.buffer = bytes;
                 taken
             }
+            // Unknown kinds are passed over, as the format wants; 0 is none, but what a hole in a file is made of.
+            (_, 0) => Err(Stop::damage(head.at, "a record of kind 0, which there is not")),
             (Part::Summary(start), opcode::FOOTER) => self.footer(&head, start),
             _ if self.framing.skip(&head)? => Ok(()),
             _ => Err(Stop::Damage(cut(&head))),
@@ -127,6 +129,7 @@ impl<R: Read> McapSource<R> {
                 self.channels.take(&message, at, &mut self.assembler)
             }
             opcode::METADATA => self.take_metadata(MetadataRecord::read(bytes).map_err(unfit("metadata"))?, at),
+            0 => Err(Stop::damage(at, "a record of kind 0, which there is not")),
             _ => Ok(()),
         }
     }

@@ -99,6 +99,11 @@ impl Body {
     }
 
     pub(super) fn write(&mut self, record: &Record) -> Result<(), Trouble> {
+        self.write_at(record, None)
+    }
+
+    /// As `write`, with another log time than the record's own, ns since 1970.
+    pub(super) fn write_at(&mut self, record: &Record, time_ns: Option<u64>) -> Result<(), Trouble> {
         let (writer, channels) = (&mut self.writer, &mut self.channels);
         self.emitter.emit(record, |message| {
             let channel = match channels[message.topic] {
@@ -109,7 +114,7 @@ impl Body {
                     &TOPICS[message.topic].message,
                 )?),
             };
-            write_message(writer, channel, message.time_ns, message.sequence, message.bytes)
+            write_message(writer, channel, time_ns.unwrap_or(message.time_ns), message.sequence, message.bytes)
         })?
     }
 

@@ -72,11 +72,16 @@ fn of_head(head: &[u8], extension: &str) -> Result<Kind, Refused> {
     if let Some((_, kind)) = OURS.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Ok(*kind);
     }
-    if let Some((_, _, what, remedy)) = OTHERS.iter().find(|(at, magic, _, _)| head.get(*at..).is_some_and(|head| head.starts_with(magic))) {
+    if let Some((_, _, what, remedy)) =
+        OTHERS.iter().find(|(at, magic, _, _)| head.get(*at..).is_some_and(|head| head.starts_with(magic)))
+    {
         return Err((format!("looks like {what}"), remedy));
     }
     if let Some((_, what)) = NAMED.iter().find(|(names, _)| names.contains(&extension)) {
-        return Err((format!("is named .{extension} but does not begin like {what}"), "copy it again, or name it after what it is"));
+        return Err((
+            format!("is named .{extension} but does not begin like {what}"),
+            "copy it again, or name it after what it is",
+        ));
     }
     if extension == "onnx" || looks_like_onnx(head) {
         return Err(("looks like an ONNX model".to_owned(), "models are for ravenposed and `ravenpose infer`; give a recording"));

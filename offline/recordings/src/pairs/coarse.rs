@@ -51,7 +51,8 @@ pub(super) fn search(
         speed_rms_m_s: motion.speed_rms_m_s,
         duration_s: motion.truth_duration_s,
     };
-    if !(motion.spread_m[0] >= limits.spread_min_m) {
+    let moves = motion.spread_m[0] >= limits.spread_min_m;
+    if !moves {
         return Err(still);
     }
     let (first_s, last_s) = (frames[0].t_s, frames[frames.len() - 1].t_s);
@@ -245,4 +246,3 @@ impl Plan {
         Candidate { clock: Clock { offset_s, drift, reference_s: self.reference_s }, correlation }
     }
 }
-

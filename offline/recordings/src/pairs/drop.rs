@@ -89,14 +89,14 @@ pub(super) fn judge(
     let mut fates: Vec<Option<Reason>> = vec![None; truth.t_s.len()];
     let mut judged: Vec<Judged> = Vec::new();
     let mut last: Option<[f64; 3]> = None;
-    for frame in 0..truth.t_s.len() {
+    for (frame, fate) in fates.iter_mut().enumerate() {
         let position_m = truth.position_m[frame];
         let repeated = last == Some(position_m);
         last = Some(position_m);
         let state_time_s = fit.clock.state_time_s(truth.t_s[frame]);
         match state_at(track, reported, position_m, state_time_s, options.runlevel, &mut place) {
-            Err(reason) => fates[frame] = Some(reason),
-            Ok(_) if repeated => fates[frame] = Some(Reason::RepeatedFrame),
+            Err(reason) => *fate = Some(reason),
+            Ok(_) if repeated => *fate = Some(Reason::RepeatedFrame),
             Ok(reported_m) => judged.push(Judged { frame, state_time_s, reported_m, truth_m: rigid.apply(position_m) }),
         }
     }
@@ -171,7 +171,7 @@ fn outliers(judged: &[Judged], noise_sd_m: [f64; 3], options: &Options) -> Vec<b
     let step_m = (limits.deviations * noise_m).max(limits.step_m);
     let labels: Vec<[f64; 3]> = judged.iter().map(Judged::label_m).collect();
     let is_outlier = |i: usize| {
-        if !(length(labels[i]) <= limits.gross_m) {
+        if length(labels[i]) > limits.gross_m {
             return true;
         }
         let around = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(labels.len());
@@ -180,9 +180,8 @@ fn outliers(judged: &[Judged], noise_sd_m: [f64; 3], options: &Options) -> Vec<b
         if neighbours.len() < NEIGHBOURS {
             return false;
         }
-        let middle: [f64; 3] = std::array::from_fn(|axis| {
-            median(&mut neighbours.iter().map(|&j| labels[j][axis]).collect::<Vec<_>>()).unwrap_or(0.0)
-        });
+        let middle: [f64; 3] =
+            std::array::from_fn(|axis| median(&mut neighbours.iter().map(|&j| labels[j][axis]).collect::<Vec<_>>()).unwrap_or(0.0));
         length(std::array::from_fn(|axis| labels[i][axis] - middle[axis])) > step_m
     };
     (0..judged.len()).map(is_outlier).collect()

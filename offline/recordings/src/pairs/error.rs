@@ -34,7 +34,9 @@ pub enum PairError {
         now: f64,
     },
     /// Too few frames with a position, or with a state at their time.
-    #[error("only {found} of {frames} true positions can be matched with a state, {needed} are needed; record longer, or check the cameras")]
+    #[error(
+        "only {found} of {frames} true positions can be matched with a state, {needed} are needed; record longer, or check the cameras"
+    )]
     TooFewFrames {
         /// Usable frames.
         found: usize,
@@ -106,7 +108,9 @@ pub enum PairError {
         second_rms_m: f64,
     },
     /// The best offset lies at the edge of the search window.
-    #[error("the best clock offset {offset_s:.3} s lies at the edge of the search ({expected_s} s ± {window_s} s); widen the window")]
+    #[error(
+        "the best clock offset {offset_s:.3} s lies at the edge of the search ({expected_s} s ± {window_s} s); widen the window"
+    )]
     AtEdge {
         /// Best offset, s.
         offset_s: f64,

@@ -30,8 +30,8 @@ pub(super) fn sum_covariance<const N: usize>(scores: &[SVector<f64, N>], correla
     scatter * (widening(stretch as f64 / count.max(1) as f64).powi(2) / stretch as f64)
 }
 
-/// 97.5 % quantile of the t statistic with Bartlett weights over a share `b` of the record, over 1.96 (table 1 of Kiefer and
-/// Vogelsang).
+/// 97.5 % quantile of the t statistic with Bartlett weights over a share `b` of the record, over 1.96 (Kiefer and Vogelsang;
+/// the test below counts how many intervals hold).
 fn widening(b: f64) -> f64 {
     (1.96 + 2.9694 * b + 0.416 * b * b - 0.5324 * b * b * b) / 1.96
 }
@@ -44,7 +44,7 @@ pub(super) fn correlation_samples(vectors: &[nalgebra::Vector3<f64>]) -> f64 {
     for lag in 1..vectors.len() / 4 {
         let product: f64 = vectors.iter().zip(&vectors[lag..]).map(|(early, late)| early.dot(late)).sum();
         // Beyond a few times what has been found already there is only chance (Sokal's window).
-        if !(product > 0.05 * square) || lag as f64 > 2.5 * total {
+        if product <= 0.05 * square || lag as f64 > 2.5 * total {
             break;
         }
         total += 2.0 * product / square;

@@ -36,11 +36,7 @@ const QUATERNION: [&str; 4] = ["qw", "qx", "qy", "qz"];
 const NEEDS: &str = "time (t_s) and the tip's position on both sides (x_mm, y_mm, z_mm and truth_x_mm, truth_y_mm, truth_z_mm)";
 
 fn column<'a>(recording: &'a Recording, name: &'static str) -> Result<&'a [f64], PairError> {
-    recording.column(name).ok_or_else(|| PairError::MissingColumn {
-        recording: recording.name.clone(),
-        column: name,
-        needs: NEEDS,
-    })
+    recording.column(name).ok_or_else(|| PairError::MissingColumn { recording: recording.name.clone(), column: name, needs: NEEDS })
 }
 
 fn columns<'a, const N: usize>(recording: &'a Recording, names: [&'static str; N]) -> Result<[&'a [f64]; N], PairError> {
@@ -107,8 +103,7 @@ impl Truth {
         same_length("truth", self.t_s.len(), lengths)?;
         rising("truth", &self.t_s)?;
         let seen = self.t_s.iter().zip(&self.position_m).filter(|(_, position)| position.iter().all(|value| value.is_finite()));
-        let frames: Vec<Frame> =
-            seen.map(|(t_s, position)| Frame { t_s: *t_s, position_m: Vector3::from(*position) }).collect();
+        let frames: Vec<Frame> = seen.map(|(t_s, position)| Frame { t_s: *t_s, position_m: Vector3::from(*position) }).collect();
         if frames.len() < frames_min.max(3) {
             return Err(PairError::TooFewFrames { found: frames.len(), needed: frames_min.max(3), frames: self.t_s.len() });
         }
@@ -128,8 +123,9 @@ fn same_length(stream: &'static str, rows: usize, lengths: impl Iterator<Item = 
 
 fn rising(stream: &'static str, times: &[f64]) -> Result<(), PairError> {
     for (row, pair) in times.windows(2).enumerate() {
-        // Written so that NaN fails.
-        if !(pair[1] > pair[0]) {
+        // A time that is not a number compares with nothing, so it fails.
+        let rises = pair[1] > pair[0];
+        if !rises {
             return Err(PairError::TimeNotRising { stream, row: row + 1, before: pair[0], now: pair[1] });
         }
     }

@@ -90,7 +90,7 @@ pub fn pair(reported: &Reported<'_>, truth: &Truth, options: &Options) -> Result
     let motion = summary::motion(&track, &frames);
     let fitted = align(&track, &frames, &motion, options)?;
     let drops = drop::judge(&track, reported, truth, &fitted.fit, options)?;
-    Ok(summary::paired(reported, truth, motion, fitted, drops, options))
+    Ok(summary::paired(reported, truth, motion, &fitted, drops, options))
 }
 
 /// Registration of positions that are already matched, `truth_m[i]` with `reported_m[i]`, in the order of time; pairs with a
@@ -206,11 +206,8 @@ fn refine(
 fn check_registration(fit: &Fit, limits: &Limits) -> Result<(), PairError> {
     let spread_m = fit.spread_m();
     let rotation_sd_rad = fit.rotation_sd_rad().into_iter().fold(0.0, f64::max);
-    // Written so that NaN fails.
-    if !(spread_m[1] >= limits.spread_min_m) || !(rotation_sd_rad <= limits.rotation_sd_max_rad) {
-        return Err(PairError::Degenerate { spread_m, spread_min_m: limits.spread_min_m, rotation_sd_rad });
-    }
-    Ok(())
+    let told = spread_m[1] >= limits.spread_min_m && rotation_sd_rad <= limits.rotation_sd_max_rad;
+    if told { Ok(()) } else { Err(PairError::Degenerate { spread_m, spread_min_m: limits.spread_min_m, rotation_sd_rad }) }
 }
 
 fn check_agreement(fit: &Fit, limits: &Limits) -> Result<(), PairError> {
@@ -231,10 +228,12 @@ fn check_clock(
     limits: &Limits,
 ) -> Result<(), PairError> {
     let offset_s = fit.clock.offset_s;
-    if !((offset_s - expected_s).abs() < window_s) {
+    let inside = (offset_s - expected_s).abs() < window_s;
+    if !inside {
         return Err(PairError::AtEdge { offset_s, expected_s, window_s });
     }
-    if !(fit.offset_sd() <= limits.offset_sd_max_s) {
+    let told = fit.offset_sd() <= limits.offset_sd_max_s;
+    if !told {
         return Err(PairError::ClockUndetermined {
             offset_sd_s: fit.offset_sd(),
             needed_s: limits.offset_sd_max_s,
@@ -245,9 +244,10 @@ fn check_clock(
     // Another refined offset counts as a rival if it is not the same minimum, and as beaten if the likelihood says so.
     let same_s = 0.02 + 4.0 * fit.offset_sd();
     let rival = rivals.iter().find(|rival| (rival.clock.offset_s - offset_s).abs() > same_s);
+    // Two perfect fits compare as not a number, and so as no better.
+    let beats = |rival: &Fit| ranked.advantage_nats(rival) >= limits.advantage_min_nats;
     match rival {
-        // Written so that NaN, two perfect fits, refuses.
-        Some(rival) if !(ranked.advantage_nats(rival) >= limits.advantage_min_nats) => Err(PairError::Ambiguous {
+        Some(rival) if !beats(rival) => Err(PairError::Ambiguous {
             first_s: offset_s,
             second_s: rival.clock.offset_s,
             first_rms_m: fit.rms_m(),

@@ -100,7 +100,7 @@ impl Default for Options {
             registration: RegistrationChoice::Fit,
             gap_max_s: 0.025,
             runlevel: Some(3),
-            outliers: OutlierLimits { deviations: 6.0, step_m: 2e-3, gross_m: 30e-3 },
+            outliers: OutlierLimits { deviations: 6.0, step_m: 4e-3, gross_m: 30e-3 },
             standstill_m: 20e-6,
             standstill_every_s: 1.0,
             limits: Limits::default(),

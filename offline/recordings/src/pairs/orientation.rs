@@ -40,10 +40,7 @@ pub(super) fn labels(
         (camera * mounting.inverse() * arm.inverse()).scaled_axis().into()
     };
     let row = |row: usize| std::array::from_fn(|column| mounting.matrix()[(row, column)]);
-    Some(Orientations {
-        labels_rad: both.into_iter().map(|pair| pair.map(label)).collect(),
-        mounting: [row(0), row(1), row(2)],
-    })
+    Some(Orientations { labels_rad: both.into_iter().map(|pair| pair.map(label)).collect(), mounting: [row(0), row(1), row(2)] })
 }
 
 fn unit(wxyz: [f64; 4]) -> Option<UnitQuaternion<f64>> {

@@ -182,11 +182,7 @@ impl fmt::Display for ClockReport {
             return writeln!(f, "clock: offset {offset_ms:.1} ms, drift {:.1} ppm, as given", self.drift_ppm);
         }
         let [low, high] = self.offset_interval_s.map(|value| value * 1e3);
-        write!(
-            f,
-            "clock: offset {offset_ms:.2} ms (95 %: {low:.2} to {high:.2}) at {:.1} s of the truth",
-            self.clock.reference_s
-        )?;
+        write!(f, "clock: offset {offset_ms:.2} ms (95 %: {low:.2} to {high:.2}) at {:.1} s of the truth", self.clock.reference_s)?;
         if self.drift_fitted {
             let [low, high] = self.drift_interval_ppm;
             write!(f, ", drift {:.1} ppm ({low:.1} to {high:.1})", self.drift_ppm)?;

@@ -60,8 +60,8 @@ impl Registered {
     }
 }
 
-/// Tukey's constant for 95 % efficiency with three-dimensional normal residuals (Rousseeuw and Van Driessen's tables of the
-/// multivariate biweight: 4.69, 5.12, 5.49 for 1, 2, 3 dimensions).
+/// Tukey's constant for 95 % efficiency with three-dimensional normal residuals, from the asymptotic variance of the location
+/// (in one dimension the same gives the well-known 4.685).
 pub(super) const BIWEIGHT: f64 = 5.49;
 
 /// Median length of a three-dimensional standard normal vector: square root of the median of chi-square with 3 degrees.
@@ -89,7 +89,7 @@ const JUDGES: usize = 500;
 /// [`PairError::Degenerate`] where the points lie on a line or too close together.
 pub(super) fn fit(points: &[Vector3<f64>], targets: &[Vector3<f64>], limits: &Limits) -> Result<Registered, PairError> {
     let spread_m = principal_deviations(targets, None);
-    if !(spread_m[1] >= limits.spread_min_m) {
+    if spread_m[1].is_nan() || spread_m[1] < limits.spread_min_m {
         return Err(PairError::Degenerate { spread_m, spread_min_m: limits.spread_min_m, rotation_sd_rad: f64::INFINITY });
     }
     let mut best = least_median(points, targets);
@@ -150,7 +150,7 @@ fn least_median(points: &[Vector3<f64>], targets: &[Vector3<f64>]) -> Registered
 /// Weighted least squares; none where no weight is left.
 fn kabsch(points: &[Vector3<f64>], targets: &[Vector3<f64>], weights: &[f64]) -> Option<Registered> {
     let total: f64 = weights.iter().sum();
-    if !(total > 0.0) {
+    if total <= 0.0 {
         return None;
     }
     let weighted = |values: &[Vector3<f64>]| values.iter().zip(weights).map(|(v, w)| v * *w).sum::<Vector3<f64>>() / total;
@@ -174,7 +174,7 @@ fn mean(points: &[Vector3<f64>]) -> Vector3<f64> {
 pub(super) fn principal_deviations(points: &[Vector3<f64>], weights: Option<&[f64]>) -> [f64; 3] {
     let weight = |i: usize| weights.map_or(1.0, |weights| weights[i]);
     let total: f64 = (0..points.len()).map(weight).sum();
-    if !(total > 0.0) {
+    if total <= 0.0 {
         return [0.0; 3];
     }
     let centre = points.iter().enumerate().map(|(i, p)| p * weight(i)).sum::<Vector3<f64>>() / total;

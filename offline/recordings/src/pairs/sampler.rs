@@ -59,7 +59,7 @@ impl Sampler {
     /// the last one. A time that lies in a gap or before the first state is passed over. Values missing at the end of `state`
     /// are NaN; a state that is not later than the last one is passed over.
     pub fn push(&mut self, t_s: f64, state: &[f64], mut row: impl FnMut(usize, &[f64])) {
-        if self.last.as_ref().is_some_and(|(last_s, _)| !(t_s > *last_s)) {
+        if t_s.is_nan() || self.last.as_ref().is_some_and(|(last_s, _)| t_s <= *last_s) {
             return;
         }
         let mut values = vec![f64::NAN; self.how.len()];
@@ -83,10 +83,8 @@ impl Sampler {
             _ => return false,
         };
         for (i, value) in values.iter_mut().enumerate() {
-            *value = before.map_or_else(
-                || now(i),
-                |before| self.how[i].between(before[i], now(i), (at_s - before_s) / (t_s - before_s)),
-            );
+            *value = before
+                .map_or_else(|| now(i), |before| self.how[i].between(before[i], now(i), (at_s - before_s) / (t_s - before_s)));
         }
         true
     }

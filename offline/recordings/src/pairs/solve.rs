@@ -10,6 +10,7 @@ use super::track::{Clock, Frame, Place, Track};
 /// Offset, drift, rotation about the three axes of frame 0, image of the centre.
 pub(super) const PARAMETERS: usize = 8;
 type Vector = SVector<f64, PARAMETERS>;
+type Mask = [bool; PARAMETERS];
 type Matrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 /// Which parameters are free.
@@ -21,7 +22,7 @@ pub(super) struct Free {
 }
 
 impl Free {
-    fn mask(self) -> [bool; PARAMETERS] {
+    fn mask(self) -> Mask {
         std::array::from_fn(|i| match i {
             0 => self.clock,
             1 => self.drift,
@@ -67,7 +68,13 @@ impl<'a> Problem<'a> {
                 .iter()
                 .zip(*targets)
                 .enumerate()
-                .map(|(frame, (point, target))| Matched { frame, t_s: 0.0, point: *point, target: *target, velocity: Vector3::zeros() })
+                .map(|(frame, (point, target))| Matched {
+                    frame,
+                    t_s: 0.0,
+                    point: *point,
+                    target: *target,
+                    velocity: Vector3::zeros(),
+                })
                 .collect(),
             Self::Tracked { track, frames, half_s } => {
                 let mut place = Place::default();
@@ -118,12 +125,12 @@ pub(super) fn solve(problem: &Problem<'_>, clock: Clock, start: Registered, free
         for (m, r) in matched.iter().zip(&residuals) {
             let weight = biweight(r.norm() / sd);
             if weight > 0.0 {
-                let jacobian = jacobian(m, &place, clock.reference_s, &mask);
+                let jacobian = jacobian(m, &place, clock.reference_s, mask);
                 normal += jacobian.transpose() * jacobian * weight;
                 gradient += jacobian.transpose() * r * weight;
             }
         }
-        let Some(step) = solved(&normal, &gradient, &mask) else { break };
+        let Some(step) = solved(&normal, &gradient, mask) else { break };
         clock.offset_s -= step[0];
         clock.drift -= step[1];
         place.rotation = Rotation3::new(-Vector3::new(step[2], step[3], step[4])) * place.rotation;
@@ -138,7 +145,7 @@ pub(super) fn solve(problem: &Problem<'_>, clock: Clock, start: Registered, free
 }
 
 /// Columns: derivatives of the residual by the parameters; zero for those that are not free.
-fn jacobian(m: &Matched, place: &Registered, reference_s: f64, mask: &[bool; PARAMETERS]) -> SMatrix<f64, 3, PARAMETERS> {
+fn jacobian(m: &Matched, place: &Registered, reference_s: f64, mask: Mask) -> SMatrix<f64, 3, PARAMETERS> {
     let lever = place.rotation * (m.point - place.centre_m);
     let mut jacobian = SMatrix::<f64, 3, PARAMETERS>::zeros();
     jacobian.set_column(0, &-m.velocity);
@@ -155,14 +162,15 @@ fn jacobian(m: &Matched, place: &Registered, reference_s: f64, mask: &[bool; PAR
 }
 
 /// Inverse of a normal matrix over the free parameters, scaled to ones on the diagonal first; none where it is singular.
-fn inverse(normal: &Matrix, mask: &[bool; PARAMETERS]) -> Option<Matrix> {
+fn inverse(normal: &Matrix, mask: Mask) -> Option<Matrix> {
     let mut unit = Vector::from_element(1.0);
     for i in 0..PARAMETERS {
         if mask[i] {
-            if !(normal[(i, i)] > 0.0) {
+            unit[i] = 1.0 / normal[(i, i)].sqrt();
+            // Zero, negative or not a number: the data say nothing of it.
+            if !unit[i].is_finite() {
                 return None;
             }
-            unit[i] = 1.0 / normal[(i, i)].sqrt();
         }
     }
     let scaled = Matrix::from_fn(|i, j| match (mask[i] && mask[j], i == j) {
@@ -170,14 +178,12 @@ fn inverse(normal: &Matrix, mask: &[bool; PARAMETERS]) -> Option<Matrix> {
         (false, true) => 1.0,
         (false, false) => 0.0,
     });
-    if !(scaled.symmetric_eigenvalues().min() > 1e-9) {
-        return None;
-    }
-    let inverse = scaled.cholesky()?.inverse();
+    let told = scaled.symmetric_eigenvalues().min() > 1e-9;
+    let inverse = scaled.cholesky().filter(|_| told)?.inverse();
     Some(Matrix::from_fn(|i, j| if mask[i] && mask[j] { inverse[(i, j)] * unit[i] * unit[j] } else { 0.0 }))
 }
 
-fn solved(normal: &Matrix, gradient: &Vector, mask: &[bool; PARAMETERS]) -> Option<Vector> {
+fn solved(normal: &Matrix, gradient: &Vector, mask: Mask) -> Option<Vector> {
     inverse(normal, mask).map(|inverse| inverse * gradient).filter(|step| step.iter().all(|value| value.is_finite()))
 }
 
@@ -191,7 +197,7 @@ fn finish(problem: &Problem<'_>, clock: Clock, place: Registered, free: Free) ->
     for (m, r) in matched.iter().zip(&residuals) {
         let u = r.norm() / sd / BIWEIGHT;
         let weight = biweight(r.norm() / sd);
-        let jacobian = jacobian(m, &place, clock.reference_s, &mask);
+        let jacobian = jacobian(m, &place, clock.reference_s, mask);
         if weight > 0.0 {
             // Derivative of weight(|r|) r by r.
             let bend = -4.0 * (1.0 - u * u) / (BIWEIGHT * sd).powi(2);
@@ -203,7 +209,7 @@ fn finish(problem: &Problem<'_>, clock: Clock, place: Registered, free: Free) ->
     }
     let correction = matched.len() as f64 / (matched.len() as f64 - free.count() as f64 / 3.0).max(1.0);
     let correlation = hac::correlation_samples(&weighted.iter().map(|(r, weight)| r * *weight).collect::<Vec<_>>());
-    let covariance = inverse(&curvature, &mask).map_or_else(
+    let covariance = inverse(&curvature, mask).map_or_else(
         || Matrix::from_fn(|i, j| if mask[i] && i == j { f64::INFINITY } else { 0.0 }),
         |inverse| inverse * hac::sum_covariance(&scores, correlation) * inverse.transpose() * correction,
     );
@@ -259,7 +265,8 @@ impl Fit {
         let mean = kept.iter().sum::<Vector3<f64>>() / kept.len().max(1) as f64;
         let variance = kept.iter().map(|target| (target - mean).norm_squared()).sum::<f64>() / kept.len().max(1) as f64;
         // An inlier share below one half means that the weights found a corner that happens to fit.
-        if kept.len() * 2 < self.residuals.len() || !(variance > 0.0) { 0.0 } else { 1.0 - self.rms_m().powi(2) / variance }
+        let told = kept.len() * 2 >= self.residuals.len() && variance > 0.0;
+        if told { 1.0 - self.rms_m().powi(2) / variance } else { 0.0 }
     }
 
     /// Standard deviations of the reported positions along their principal axes, largest first, m; inliers only.

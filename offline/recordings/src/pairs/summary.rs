@@ -114,7 +114,7 @@ pub(super) fn paired(
     reported: &Reported<'_>,
     truth: &Truth,
     motion: Motion,
-    aligned: Aligned,
+    aligned: &Aligned,
     drops: Drops,
     options: &Options,
 ) -> Paired {
@@ -148,11 +148,11 @@ pub(super) fn paired(
         pairs: pairs.len(),
         dropped: Reason::ALL.into_iter().map(|reason| Dropped { reason, frames: count(reason) }).collect(),
         motion,
-        clock: clock(&aligned),
+        clock: clock(aligned),
         registration: registration(&aligned.fit, aligned.free.rigid),
         label: label(&labels, drops.noise_sd_m),
         orientation,
-        notes: notes(&aligned, &motion),
+        notes: notes(aligned, &motion),
     };
     Paired { pairs, fates: drops.fates, clock: aligned.fit.clock, registration: rigid, report }
 }

@@ -74,7 +74,11 @@ pub(super) fn find(times: &[f64], t_s: f64, gap_max_s: f64, place: &mut Place) -
     }
     let row = row_at(times, t_s, place);
     if times[row] == t_s || row + 1 == times.len() {
-        return if row + 1 < times.len() { Found::Between { row, share: 0.0 } } else { Found::Between { row: row - 1, share: 1.0 } };
+        return if row + 1 < times.len() {
+            Found::Between { row, share: 0.0 }
+        } else {
+            Found::Between { row: row - 1, share: 1.0 }
+        };
     }
     let interval_s = times[row + 1] - times[row];
     if interval_s > gap_max_s { Found::Gap } else { Found::Between { row, share: (t_s - times[row]) / interval_s } }

@@ -13,6 +13,7 @@ mod read;
 mod state_columns;
 mod state_reader;
 mod state_writer;
+mod store;
 mod table_reader;
 mod table_writer;
 mod write;

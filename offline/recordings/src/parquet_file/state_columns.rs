@@ -8,17 +8,8 @@ use crate::fields::MESSAGE;
 use crate::stream::Truth;
 
 /// Header and times; the widest type that holds each of them.
-pub(super) const HEADER: [&str; 9] = [
-    "source_id",
-    "sequence",
-    "source_time_ns",
-    "arms",
-    "hdr_seq",
-    "hdr_stamp_s",
-    "hdr_stamp_ns",
-    "dt_s",
-    "dt_ns",
-];
+pub(super) const HEADER: [&str; 9] =
+    ["source_id", "sequence", "source_time_ns", "arms", "hdr_seq", "hdr_stamp_s", "hdr_stamp_ns", "dt_s", "dt_ns"];
 
 /// The header of a state; 64-bit counters without a sign keep their bits.
 pub(super) fn header(state: &RavenState) -> [i64; HEADER.len()] {
@@ -79,8 +70,7 @@ pub(super) fn truth_names(side: Side) -> Vec<String> {
 
 /// All columns, empty.
 pub(super) fn columns() -> Vec<Column> {
-    let mut columns: Vec<Column> =
-        HEADER.iter().map(|name| Column::new((*name).to_owned(), Values::I64(Vec::new()))).collect();
+    let mut columns: Vec<Column> = HEADER.iter().map(|name| Column::new((*name).to_owned(), Values::I64(Vec::new()))).collect();
     for field in MESSAGE {
         for place in 0..field.count() {
             let values = if field.is_int() { Values::I32(Vec::new()) } else { Values::F32(Vec::new()) };

@@ -6,10 +6,11 @@ use std::path::Path;
 use arm::Side;
 use ravenpose_wire::RavenState;
 
-use super::read::{CellValues, Cells, Groups, Store};
-use super::state_columns::{self, HEADER, TRUTH_NUMBERS};
-use super::write::Values;
 use super::STATES_LAYOUT;
+use super::read::{CellValues, Cells, Groups};
+use super::state_columns::{self, HEADER, TRUTH_NUMBERS};
+use super::store::Store;
+use super::write::Values;
 use crate::fields::{self, MESSAGE};
 use crate::file::refusal;
 use crate::stream::{Damage, Record, Source, StreamError, Truth};

@@ -72,8 +72,9 @@ fn message_numbers() -> usize {
 
 /// Appends a state's cells; empty ones for a row that holds truth only.
 fn push_state(columns: &mut [Column], state: Option<&RavenState>) {
-    let level = i16::from(state.is_some());
-    columns.iter_mut().for_each(|column| column.levels.push(level));
+    for column in &mut *columns {
+        column.cell(state.is_some());
+    }
     let Some(state) = state else { return };
     let (header, message) = columns.split_at_mut(state_columns::HEADER.len());
     for (column, value) in header.iter_mut().zip(state_columns::header(state)) {
@@ -105,16 +106,18 @@ fn push_state(columns: &mut [Column], state: Option<&RavenState>) {
 /// Appends a truth's cells; what is not known is empty.
 fn push_truth(columns: &mut [Column], truth: Option<&Truth>) {
     let Some((time, numbers)) = columns.split_first_mut() else { return };
-    time.levels.push(i16::from(truth.is_some()));
+    time.cell(truth.is_some());
     let Some(truth) = truth else {
-        numbers.iter_mut().for_each(|column| column.levels.push(0));
+        for column in numbers {
+            column.cell(false);
+        }
         return;
     };
     if let Values::I64(values) = &mut time.values {
         values.push(truth.time_ns);
     }
     for (column, number) in numbers.iter_mut().zip(state_columns::truth_numbers(truth)) {
-        column.levels.push(i16::from(!number.is_nan()));
+        column.cell(!number.is_nan());
         if let Values::F64(values) = &mut column.values
             && !number.is_nan()
         {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::read::{CellValues, Cells, Groups, Store};
+use super::read::{CellValues, Cells, Groups};
+use super::store::Store;
 use crate::stream::{Damage, StreamError};
 use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
 
@@ -35,10 +36,11 @@ impl TableReader {
 
     fn new(path: &Path, store: Store) -> Result<Self, StreamError> {
         let groups = Groups::open(path, store)?;
-        let columns = groups.names.iter().zip(&groups.cells).map(|(name, cells)| TableColumn {
-            name: name.clone(),
-            text: matches!(cells.values, CellValues::Text(_)),
-        });
+        let columns = groups
+            .names
+            .iter()
+            .zip(&groups.cells)
+            .map(|(name, cells)| TableColumn { name: name.clone(), text: matches!(cells.values, CellValues::Text(_)) });
         Ok(Self { columns: columns.collect(), groups })
     }
 }

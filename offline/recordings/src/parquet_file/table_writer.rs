@@ -31,12 +31,14 @@ impl TableSink for TableWriter {
         for (column, cells) in self.groups.columns.iter_mut().zip(&batch.columns) {
             match (&mut column.values, cells) {
                 (Values::F64(values), ColumnCells::Numbers(numbers)) => {
-                    column.levels.extend(numbers.iter().map(|number| i16::from(!number.is_nan())));
                     values.extend(numbers.iter().filter(|number| !number.is_nan()));
+                    for number in numbers {
+                        column.cell(!number.is_nan());
+                    }
                 }
                 (Values::Text(values), ColumnCells::Texts(texts)) => {
-                    column.levels.extend(texts.iter().map(|text| i16::from(!text.is_empty())));
                     values.extend(texts.iter().filter(|text| !text.is_empty()).map(ByteArray::from));
+                    texts.iter().for_each(|text| column.cell(!text.is_empty()));
                 }
                 // Both were made for the same columns.
                 _ => debug_assert!(false, "cells of another kind"),

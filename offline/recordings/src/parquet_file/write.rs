@@ -16,9 +16,6 @@ use super::{CHECKSUM_KEY, LAYOUT_KEY, ROW_GROUP_ROWS};
 use crate::file::{WholeFile, cannot_write, refusal};
 use crate::stream::StreamError;
 
-/// A dictionary beyond this size gains nothing: the column is then written value by value.
-const DICTIONARY_BYTES: usize = 1 << 14;
-
 /// Values of a column that wait to be written.
 #[derive(Debug)]
 pub(super) enum Values {
@@ -34,13 +31,25 @@ pub(super) enum Values {
 pub(super) struct Column {
     pub(super) name: String,
     pub(super) values: Values,
-    /// 1 for a cell with a value, 0 for an empty one.
-    pub(super) levels: Vec<i16>,
+    cells: usize,
+    /// 1 for a cell with a value, 0 for an empty one; nothing as long as none is empty.
+    levels: Vec<i16>,
 }
 
 impl Column {
     pub(super) fn new(name: String, values: Values) -> Self {
-        Self { name, values, levels: Vec::new() }
+        Self { name, values, cells: 0, levels: Vec::new() }
+    }
+
+    /// A cell is added: its value, if it has one, goes to `values`.
+    pub(super) fn cell(&mut self, has_value: bool) {
+        if !has_value && self.levels.is_empty() {
+            self.levels.resize(self.cells, 1);
+        }
+        if !has_value || !self.levels.is_empty() {
+            self.levels.push(i16::from(has_value));
+        }
+        self.cells += 1;
     }
 
     fn schema(&self) -> Result<Type, ParquetError> {
@@ -52,7 +61,11 @@ impl Column {
             Values::Text(_) => PhysicalType::BYTE_ARRAY,
         };
         let builder = Type::primitive_type_builder(&self.name, physical).with_repetition(Repetition::OPTIONAL);
-        if matches!(self.values, Values::Text(_)) { builder.with_converted_type(ConvertedType::UTF8).build() } else { builder.build() }
+        if matches!(self.values, Values::Text(_)) {
+            builder.with_converted_type(ConvertedType::UTF8).build()
+        } else {
+            builder.build()
+        }
     }
 
     /// How values without a dictionary are laid out: bytes of equal weight together for floats, differences for whole
@@ -65,8 +78,10 @@ impl Column {
         }
     }
 
-    fn write(&mut self, writer: &mut SerializedColumnWriter<'_>) -> Result<(), ParquetError> {
-        let levels = Some(self.levels.as_slice());
+    /// Writes the cells; `ones` are the levels of a column without empty cells.
+    fn write(&mut self, writer: &mut SerializedColumnWriter<'_>, ones: &mut Vec<i16>) -> Result<(), ParquetError> {
+        ones.resize(self.cells, 1);
+        let levels = Some(if self.levels.is_empty() { ones.as_slice() } else { self.levels.as_slice() });
         match &mut self.values {
             Values::I32(values) => {
                 writer.typed::<Int32Type>().write_batch(values, levels, None)?;
@@ -90,6 +105,7 @@ impl Column {
             }
         }
         self.levels.clear();
+        self.cells = 0;
         Ok(())
     }
 }
@@ -118,7 +134,7 @@ impl Groups {
 
     /// A row is complete: all columns have as many cells as the first.
     pub(super) fn row_done(&mut self) -> Result<(), StreamError> {
-        if self.columns.first().is_some_and(|column| column.levels.len() >= ROW_GROUP_ROWS) { self.flush() } else { Ok(()) }
+        if self.columns.first().is_some_and(|column| column.cells >= ROW_GROUP_ROWS) { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<(), StreamError> {
@@ -127,7 +143,7 @@ impl Groups {
     }
 
     pub(super) fn finish(mut self) -> Result<(), StreamError> {
-        if self.columns.first().is_some_and(|column| !column.levels.is_empty()) {
+        if self.columns.first().is_some_and(|column| column.cells > 0) {
             self.flush()?;
         }
         let Self { path, mut writer, checksums, .. } = self;
@@ -144,11 +160,14 @@ fn begin(file: WholeFile, columns: &[Column], pairs: Vec<KeyValue>) -> Result<Se
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
         .set_statistics_enabled(EnabledStatistics::None)
         .set_offset_index_disabled(true)
-        .set_dictionary_page_size_limit(DICTIONARY_BYTES)
         .set_created_by("ravenpose".to_owned())
         .set_key_value_metadata(Some(pairs));
     for column in columns {
-        properties = properties.set_column_encoding(ColumnPath::new(vec![column.name.clone()]), column.encoding());
+        let path = ColumnPath::new(vec![column.name.clone()]);
+        // Numbers rarely repeat: looking for those that do takes longer than writing them.
+        properties = properties
+            .set_column_dictionary_enabled(path.clone(), matches!(column.values, Values::Text(_)))
+            .set_column_encoding(path, column.encoding());
     }
     let summed = Summed { file, sum: crc32fast::Hasher::new(), start: 0, end: 0 };
     let mut writer = SerializedFileWriter::new(summed, Arc::new(schema), Arc::new(properties.build()))?;
@@ -157,12 +176,17 @@ fn begin(file: WholeFile, columns: &[Column], pairs: Vec<KeyValue>) -> Result<Se
     Ok(writer)
 }
 
-fn flush(writer: &mut SerializedFileWriter<Summed>, columns: &mut [Column], checksums: &mut Vec<String>) -> Result<(), ParquetError> {
+fn flush(
+    writer: &mut SerializedFileWriter<Summed>,
+    columns: &mut [Column],
+    checksums: &mut Vec<String>,
+) -> Result<(), ParquetError> {
     let mut group = writer.next_row_group()?;
+    let mut ones = Vec::new();
     for column in columns {
         // One writer per column of the schema, which was made of the same columns.
         let Some(mut chunk) = group.next_column()? else { break };
-        column.write(&mut chunk)?;
+        column.write(&mut chunk, &mut ones)?;
         chunk.close()?;
     }
     group.close()?;

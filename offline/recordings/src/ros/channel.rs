@@ -2,6 +2,7 @@
 
 use super::assembly::{Assembler, Role};
 use super::container::Stop;
+use super::definitions::RAVEN_STATE;
 use crate::stream::Channel;
 
 /// A channel whose messages may be met.
@@ -11,9 +12,30 @@ pub(crate) struct KnownChannel {
     role: Option<Role>,
 }
 
+/// The topic that the states of a file come from: the first one of their type. The lab's launch file throttles `/ravenstate` to
+/// `/ravenstate_100hz`; from both of them every tenth state would come twice.
+#[derive(Debug, Default)]
+pub(crate) struct StateTopic(Option<String>);
+
+impl StateTopic {
+    /// Are the states of this topic of another one already?
+    fn is_elsewhere(&mut self, topic: &str, type_name: &str) -> bool {
+        type_name == RAVEN_STATE.name && self.0.get_or_insert_with(|| topic.to_owned()) != topic
+    }
+}
+
 impl KnownChannel {
     /// A channel at this byte, with ROS 1 messages of this definition.
-    pub(crate) fn ros1(topic: String, type_name: String, definition: &str, at: u64) -> Result<Self, Stop> {
+    pub(crate) fn ros1(
+        topic: String,
+        type_name: String,
+        definition: &str,
+        at: u64,
+        state_topic: &mut StateTopic,
+    ) -> Result<Self, Stop> {
+        if state_topic.is_elsewhere(&topic, &type_name) {
+            return Ok(Self::other(topic, type_name, "ros1".to_owned()));
+        }
         let role = Role::of(&topic, &type_name, definition).map_err(|error| Stop::Refused {
             byte: at,
             what: format!("the definition of {type_name} on {topic} {error}"),

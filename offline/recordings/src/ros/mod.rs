@@ -10,9 +10,9 @@
 //!
 //! A bag also has `/ravenpose/metadata` (`diagnostic_msgs/KeyValue`), for which MCAP has records of its own.
 //!
-//! Read are also: states under any other topic of that type, by the definition in the file, and `/ext_jpos`
-//! (`sensor_msgs/JointState`), the lab's encoders on joints 1 to 3. States that no origin stands before are counted from 1
-//! and have the time since the first of them as source time.
+//! Read are also: states under another topic of that type (the first one of a file), by the definition in the file; and
+//! `/ext_jpos` (`sensor_msgs/JointState`), the lab's encoders on joints 1 to 3 of the arm that is connected, of the gold one where
+//! both are. States that no origin stands before are counted from 1 and have the time since the first of them as source time.
 
 mod assembly;
 mod bytes;
@@ -33,7 +33,7 @@ pub use state::{STATE_BYTES, StateDecoder, decode_state, encode_state};
 
 pub(crate) use assembly::{Assembler, admit_encoding};
 pub(crate) use bytes::Cursor;
-pub(crate) use channel::KnownChannel;
+pub(crate) use channel::{KnownChannel, StateTopic};
 pub(crate) use compression::{Compression, Decompressor, salvage};
 pub(crate) use container::{CHANNELS_MAX, HELD_MAX, Stop, TEXT_MAX, damage, fill, refused, settle, unreadable};
 pub(crate) use emission::{Emitter, METADATA_TOPIC, Message, TOPICS, Topic, Unfit};

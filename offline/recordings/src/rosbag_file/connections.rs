@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use super::framing::Fields;
-use crate::ros::{Assembler, CHANNELS_MAX, KnownChannel, Stop, TEXT_MAX};
+use crate::ros::{Assembler, CHANNELS_MAX, KnownChannel, StateTopic, Stop, TEXT_MAX};
 use crate::stream::Channel;
 
 /// What is known so far.
 #[derive(Debug, Default)]
 pub(super) struct Connections {
     known: BTreeMap<u32, Connection>,
+    state_topic: StateTopic,
     /// Text that is kept, bytes.
     text_bytes: usize,
 }
@@ -45,7 +46,7 @@ impl Connections {
         let (Some(type_name), Some(definition)) = (said.text("type"), said.text("message_definition")) else {
             return refused(format!("the connection of {topic} does not say the type of its messages"));
         };
-        let channel = KnownChannel::ros1(topic, type_name, &definition, at)?;
+        let channel = KnownChannel::ros1(topic, type_name, &definition, at, &mut self.state_topic)?;
         let _ = self.known.insert(id, Connection { data: data.to_vec(), channel });
         Ok(())
     }

@@ -97,14 +97,14 @@ impl<R: Read> RosbagSource<R> {
         Ok(source)
     }
 
-    /// Reads one record, of the file or of the chunk at hand. Damage ends the stream here.
+    /// Reads one record, of the file or of the chunk at hand. Damage and errors end the stream here.
     fn advance(&mut self) -> Result<(), StreamError> {
         let in_chunk = self.chunk.at < self.chunk.records.len() || self.chunk.cut.is_some();
         let stopped = if in_chunk { self.inner() } else { self.outer() };
         let Err(stop) = stopped else { return Ok(()) };
-        self.damage = Some(settle(&self.path, stop)?);
         self.chunk = Chunk::default();
         self.end();
+        self.damage = Some(settle(&self.path, stop)?);
         Ok(())
     }
 

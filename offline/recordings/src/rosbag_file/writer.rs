@@ -201,9 +201,10 @@ fn topic(connection: usize) -> &'static Topic {
     TOPICS.get(connection).unwrap_or(&METADATA_TOPIC)
 }
 
-/// A frame as ROS's own reader wants it (`roslz4`): blocks for themselves without a checksum, one checksum of the whole.
+/// A frame as ROS's own reader wants it (`roslz4`): blocks for themselves without a checksum, one checksum of the whole. Blocks of
+/// 256 KiB: whoever reads holds one of them, packed and unpacked.
 fn lz4(bytes: &[u8]) -> Result<Vec<u8>, Trouble> {
-    let frame = FrameInfo::new().block_mode(BlockMode::Independent).block_size(BlockSize::Max1MB).content_checksum(true);
+    let frame = FrameInfo::new().block_mode(BlockMode::Independent).block_size(BlockSize::Max256KB).content_checksum(true);
     let mut encoder = FrameEncoder::with_frame_info(frame, Vec::with_capacity(bytes.len() / 2));
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)

@@ -56,7 +56,9 @@ impl Reader {
         let read = input.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut bytes);
         read.map_err(|error| InputProblem::Read(error).refusal(path))?;
         let (said, period_ns, said_hash) = match <&[u8; HEADER_BYTES]>::try_from(bytes.as_slice()) {
-            Ok(header) => check_header(header).and_then(|checked| if checked.0 == 0 { Err(StateFileProblem::Empty) } else { Ok(checked) }),
+            Ok(header) => {
+                check_header(header).and_then(|checked| if checked.0 == 0 { Err(StateFileProblem::Empty) } else { Ok(checked) })
+            }
             Err(_) => Err(StateFileProblem::NoHeader { bytes: bytes.len() }),
         }
         .map_err(|problem| refused(path, &problem))?;

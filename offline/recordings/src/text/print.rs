@@ -143,8 +143,8 @@ fn digits_of(value: f64) -> Option<(u64, i32)> {
     let mantissa = (bits & ((1 << 52) - 1)) | (1 << 52);
     let zeros = mantissa.trailing_zeros();
     let (mantissa, binary) = (mantissa >> zeros, biased - 1075 + zeros as i32);
-    let mut exponent = value.log10().floor() as i32;
-    // The logarithm may be one off next to a power of ten.
+    // log10(2) is a little more than 1233/4096: the decimal exponent is this or one more.
+    let mut exponent = ((biased - 1023) * 1233) >> 12;
     for _ in 0..3 {
         let digits = times_power(mantissa, binary, DIGITS - 1 - exponent)?;
         if digits < DIGITS_MIN {
@@ -258,7 +258,8 @@ mod tests {
 
     #[test]
     fn six_decimals_are_those_of_c() {
-        for value in patterns().map(|bits| f32::from_bits(bits as u32)).chain([0.0, -0.0, 0.5e-6, 1.5e-6, -12.0, 51_559.766, 3e38]) {
+        for value in patterns().map(|bits| f32::from_bits(bits as u32)).chain([0.0, -0.0, 0.5e-6, 1.5e-6, -12.0, 51_559.766, 3e38])
+        {
             let expected = if value.is_nan() { "nan".to_owned() } else { format!("{value:.6}") };
             assert_eq!(text(|out| fixed6(out, value)), expected, "{value:e}");
         }

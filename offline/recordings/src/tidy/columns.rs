@@ -90,12 +90,11 @@ impl ArmColumns {
         row.extend(radians(&state.jvel));
         row.extend(radians(&state.jpos_d));
         row.extend(state.pos[first_axis..first_axis + 3].iter().map(|um| f64::from(*um) / 1e3));
-        match truth {
-            Some(truth) => self.push_truth(row, truth, time_ns),
-            None => {
-                let count = self.truth.numbers.iter().filter(|shown| **shown).count() + usize::from(self.truth.offset);
-                row.extend(std::iter::repeat_n(f64::NAN, count));
-            }
+        if let Some(truth) = truth {
+            self.push_truth(row, truth, time_ns);
+        } else {
+            let count = self.truth.numbers.iter().filter(|shown| **shown).count() + usize::from(self.truth.offset);
+            row.extend(std::iter::repeat_n(f64::NAN, count));
         }
     }
 
@@ -127,8 +126,7 @@ fn ten_digits(value: f64) -> f64 {
 }
 
 const POWERS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21,
-    1e22,
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 
 #[cfg(test)]
@@ -153,7 +151,8 @@ mod tests {
 
     #[test]
     fn millimetres_are_read_as_the_same_metres() {
-        let off = (0..10_000).map(|i| f64::from(i) * 1.234_567e-5 - 0.05).filter(|metres| millimetres(*metres) / 1e3 != *metres).count();
+        let off =
+            (0..10_000).map(|i| f64::from(i) * 1.234_567e-5 - 0.05).filter(|metres| millimetres(*metres) / 1e3 != *metres).count();
         assert!(off < 3_000, "{off}");
         assert_eq!(millimetres(0.123_456), 123.456);
     }

@@ -53,18 +53,7 @@ impl StateTable {
         columns.push(TableColumn::number("runlevel"));
         let metadata = metadata(source.as_ref(), &sides, start_ns);
         let row = Vec::with_capacity(columns.len());
-        Ok(Self {
-            source,
-            peeked,
-            align: Align::default(),
-            arms,
-            columns,
-            metadata,
-            start_ns,
-            ended: false,
-            uncovered: 0,
-            row,
-        })
+        Ok(Self { source, peeked, align: Align::default(), arms, columns, metadata, start_ns, ended: false, uncovered: 0, row })
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, StreamError> {
@@ -90,9 +79,9 @@ impl StateTable {
         self.row.push(row.time_ns.saturating_sub(self.start_ns.unwrap_or(row.time_ns)) as f64 / 1e9);
         for arm in &self.arms {
             let truth = row.truths[arm.arm.side.index()].as_ref();
-            self.uncovered += u64::from(truth.is_some_and(|truth| {
-                !arm.truth.covers(truth) || (!arm.truth.offset && truth.time_ns != row.time_ns)
-            }));
+            self.uncovered += u64::from(
+                truth.is_some_and(|truth| !arm.truth.covers(truth) || (!arm.truth.offset && truth.time_ns != row.time_ns)),
+            );
             arm.push(&mut self.row, &row.state, row.time_ns, truth);
         }
         self.row.push(f64::from(row.state.runlevel));
@@ -172,8 +161,7 @@ fn connected(records: &VecDeque<Record>) -> Vec<Side> {
 
 /// What the truth of an arm knows in these records, and whether it comes at other times than the states.
 fn truth_shown(records: &VecDeque<Record>, side: Side) -> TruthShown {
-    let times: HashSet<i64> =
-        records.iter().filter(|record| matches!(record, Record::State(_))).map(Record::time_ns).collect();
+    let times: HashSet<i64> = records.iter().filter(|record| matches!(record, Record::State(_))).map(Record::time_ns).collect();
     let mut shown = TruthShown::default();
     for record in records {
         if let Record::Truth(truth) = record

@@ -29,6 +29,7 @@ struct RobotFile {
     plant: toml::Table,
     cable: Option<CableTable>,
     homing: Option<HomingTable>,
+    stiction: Option<StictionTable>,
     #[serde(default, rename = "effect")]
     effects: Vec<EffectTable>,
 }
@@ -45,6 +46,12 @@ struct CableTable {
 #[serde(deny_unknown_fields)]
 struct HomingTable {
     offset_sd: [f64; JOINTS],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StictionTable {
+    presliding: [f64; 3],
 }
 
 #[derive(Deserialize)]
@@ -98,6 +105,11 @@ fn robot(text: &str) -> Result<Robot, RobotError> {
         let good = homing.offset_sd.iter().all(|sd| sd.is_finite() && *sd >= 0.0);
         require(good, "homing.offset_sd", "must hold numbers of 0 or more, rad and m")?;
         robot.homing_offset_sd = homing.offset_sd;
+    }
+    if let Some(stiction) = file.stiction {
+        let good = stiction.presliding.iter().all(|travel| travel.is_finite() && *travel > 0.0);
+        require(good, "stiction.presliding", "must hold numbers above 0, rad, rad and m")?;
+        robot.presliding = Some(stiction.presliding);
     }
     robot.effects = file.effects.iter().enumerate().map(|(i, table)| effect(i + 1, table)).collect::<Result<_, _>>()?;
     Ok(robot)

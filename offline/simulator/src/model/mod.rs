@@ -14,6 +14,9 @@
 //! [homing]                    # a new static offset at each homing: standard deviation per joint, rad and m
 //! offset_sd = [0.01, 0.01, 0.002, 0.0, 0.0, 0.0, 0.0]
 //!
+//! [stiction]                  # joint friction that holds at rest: travel over which it turns, rad, rad, m
+//! presliding = [1e-4, 1e-4, 2e-5]
+//!
 //! [[effect]]
 //! physics = "backlash"        # a name of models/gap-vocabulary.json
 //! joint = 3
@@ -83,6 +86,9 @@ pub struct Robot {
     pub raven: Raven2,
     /// A cable law other than the plant's, joints 1 to 3.
     pub cables: Option<Pretension>,
+    /// Joint friction of joints 1 to 3 that holds at rest, with the travel over which it turns, rad, rad, m; none: the smoothed
+    /// sign of the plant file, which creeps.
+    pub presliding: Option<[f64; 3]>,
     /// Standard deviation of the offset that each homing leaves, rad and m.
     pub homing_offset_sd: [f64; JOINTS],
     /// Named physics on top.
@@ -115,7 +121,7 @@ impl Robot {
     }
 
     fn of(raven: Raven2) -> Self {
-        Self { name: raven.plant().name.clone(), raven, cables: None, homing_offset_sd: [0.0; JOINTS], effects: Vec::new() }
+        Self { name: raven.plant().name.clone(), raven, cables: None, presliding: None, homing_offset_sd: [0.0; JOINTS], effects: Vec::new() }
     }
 
     /// A robot from the text of a plant file or a robot file.

@@ -89,6 +89,26 @@ pub(crate) struct Drive {
     pub(crate) eccentricity: Vec<Timed<PulleyEccentricity>>,
     /// Sum of the offsets that act now, joint units.
     pub(crate) offset: f64,
+    /// Joint friction that holds at rest.
+    pub(crate) stiction: Option<Stiction>,
+}
+
+/// Friction whose sign is a memory instead of a function of the speed (Dahl 1968): a joint that stands keeps it, so it does
+/// not creep under load as with a smoothed sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stiction {
+    /// Travel over which the sign turns, rad or m.
+    pub(crate) presliding: f64,
+    /// Place of the memory.
+    pub(crate) slot: usize,
+}
+
+impl Stiction {
+    /// Rate of the sign. Over one step it turns at most once: at speed the travel of a step is longer than the presliding.
+    #[inline]
+    pub(crate) fn rate(&self, speed: f64, sign: f64, step_s: f64) -> f64 {
+        (speed - speed.abs() * sign) / self.presliding.max(speed.abs() * step_s)
+    }
 }
 
 /// What the cable does at one deflection.
@@ -136,6 +156,7 @@ impl Drive {
             ratio: Vec::new(),
             eccentricity: Vec::new(),
             offset: 0.0,
+            stiction: None,
         }
     }
 
@@ -188,7 +209,9 @@ impl Drive {
             }
         }
         let mut contact = 1.0;
-        for backlash in on(&self.backlash) {
+        let mut loose = false;
+        for backlash in on(&self.backlash).filter(|backlash| backlash.b > 0.0) {
+            loose = true;
             taken = backlash.elastic(taken);
             contact = f64::min(contact, backlash.contact(taken));
         }
@@ -224,7 +247,7 @@ impl Drive {
         found.damping *= contact;
         let damped = found.torque + found.damping * rate;
         // A flank pushes, it never pulls.
-        found.torque = if self.backlash.is_empty() || damped * taken > 0.0 { damped } else { 0.0 };
+        found.torque = if !loose || damped * taken > 0.0 { damped } else { 0.0 };
         found
     }
 
@@ -264,9 +287,12 @@ impl Drive {
 
     /// Friction of the joint at its speed.
     #[inline]
-    pub(crate) fn joint_friction(&self, speed: f64, warm: f64) -> Friction {
+    pub(crate) fn joint_friction(&self, speed: f64, warm: f64, aux: &[f64]) -> Friction {
         let joint = &self.nominal.joint;
-        let (sign, chord) = sign_and_chord(speed, joint.width);
+        let (sign, chord) = match self.stiction {
+            None => sign_and_chord(speed, joint.width),
+            Some(stiction) => (aux[stiction.slot], 0.0),
+        };
         let mut level = joint.coulomb;
         let mut one_sided = 0.0;
         let mut viscous = joint.viscous;
@@ -292,6 +318,18 @@ impl Drive {
             slope: warm * level * chord + viscous,
             sign_slope: chord,
         }
+    }
+
+    /// Slope of the joint's friction at standstill with every effect acting.
+    pub(crate) fn steepest_friction(&self) -> f64 {
+        let joint = &self.nominal.joint;
+        let coulomb: f64 = self.coulomb.iter().map(|friction| friction.effect.f_c * (1.0 + friction.effect.asymmetry.abs())).sum();
+        let stribeck: f64 = self.stribeck.iter().map(|friction| friction.effect.f_s.max(friction.effect.f_c)).sum();
+        let load: f64 = self.load.iter().map(|friction| friction.effect.f_0).sum();
+        let viscous: f64 = self.viscous.iter().map(|friction| friction.effect.b).sum();
+        // A sign with memory has no slope over the speed.
+        let level = if self.stiction.is_some() { 0.0 } else { joint.coulomb + coulomb + stribeck + load };
+        level / joint.width + joint.viscous + viscous
     }
 
     /// Capstan torque that acts for a commanded one, without ripple, N·m.

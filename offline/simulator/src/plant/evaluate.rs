@@ -135,7 +135,10 @@ impl Plant {
                 out.motor[i] += drive.ripple(state.motors[i]);
             }
             out.motor_slope[i] = motor_slope;
-            let friction = drive.joint_friction(state.rates[i], warm);
+            if let Some(stiction) = drive.stiction {
+                out.memory_rates[stiction.slot] = stiction.rate(state.rates[i], state.memories[stiction.slot], self.step_s);
+            }
+            let friction = drive.joint_friction(state.rates[i], warm, &state.memories);
             let pulled: f64 = (0..n).map(|k| self.coupling[k][i] * torque[k]).sum::<f64>() + external[i] - friction.torque;
             out.joint_slope[i] = friction.slope;
             out.drive[i] = if friction.per_load == 0.0 {

@@ -14,7 +14,7 @@ use arm::serial::{SerialArm, Workspace};
 use nalgebra::Vector3;
 
 pub use cable::{CableForce, CableLaw};
-pub(crate) use drive::{Drive, Timed, on};
+pub(crate) use drive::{Drive, Stiction, Timed, on};
 pub use drive::{DriveNumbers, Rubbing};
 pub use step::Method;
 
@@ -23,7 +23,7 @@ use crate::physics::{ExternalContact, GravityDirection, JointCoupling, JointOffs
 /// Most joints that a plant can have.
 pub const JOINTS_MAX: usize = 8;
 /// Most memories (hysteresis, creep, warmth) that a plant can have.
-pub const MEMORIES_MAX: usize = 32;
+pub const MEMORIES_MAX: usize = 16;
 
 /// One number per joint; those beyond the plant's joints are 0.
 pub type Vector = [f64; JOINTS_MAX];
@@ -164,6 +164,24 @@ impl Plant {
     /// Another step, s, and method.
     pub fn set_step(&mut self, method: Method, step_s: f64) {
         (self.method, self.step_s) = (method, step_s);
+    }
+
+    /// Largest rate at which friction and cable dampers pull a joint or motor to rest, 1/s, at joint positions: what limits an
+    /// explicit step. Effects that start later count.
+    pub fn fastest_rate(&mut self, joints: &Vector) -> f64 {
+        let n = self.joints;
+        let mut mass = [0.0; JOINTS_MAX * JOINTS_MAX];
+        self.body.mass_matrix(&mut self.workspace, &joints[..n], &mut mass[..n * n]);
+        let mut fastest = 0.0_f64;
+        for i in 0..n {
+            let drive = &self.drives[i];
+            let nominal = &drive.nominal;
+            let damping = nominal.radius_m * nominal.radius_m * nominal.cable.at(0.0).damping_ns_m;
+            fastest = fastest.max((drive.steepest_friction() + damping) / mass[i * n + i]);
+            let motor = nominal.motor.coulomb / nominal.motor.width + nominal.motor.viscous;
+            fastest = fastest.max((motor + nominal.gear / (nominal.ratio * nominal.ratio) * damping) / nominal.inertia);
+        }
+        fastest
     }
 
     /// The rigid body as it is now.

@@ -1,0 +1,58 @@
+"""Speed and memory of the offline tools: `make bench-offline` (part of `make bench`); `--minutes M` for another length.
+
+Times the simulator in its process (times real time, step, accuracy), then `ravenpose simulate` and conversions as a user runs them:
+seconds, times real time, MB/s of input, peak resident memory.
+"""
+import argparse
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+BIN = ROOT / "target/release"
+
+
+def run(arguments):
+    """Seconds and peak resident memory in MiB of a child; ends the program if it fails."""
+    begun = time.monotonic()
+    process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status != 0:
+        sys.exit(f"{' '.join(map(str, arguments))}: failed with status {status}")
+    return time.monotonic() - begun, usage.ru_maxrss / 1024
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--minutes", type=float, default=140.0)
+    minutes = parser.parse_args().minutes
+    subprocess.run([BIN / "examples/speed"], check=True)
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="ravenpose-bench."))
+    try:
+        seconds, memory = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--seed", "1", "--robot", "raven2-worn",
+                               "--run-minutes", "60", "--out", folder / "runs"])
+        runs = sorted((folder / "runs").glob("*.mcap"))
+        size = sum(path.stat().st_size for path in runs)
+        print(f"simulate {minutes:g} min, one arm, worn, MCAP with truth: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time, "
+              f"{os.cpu_count()} cores), {size / 1e6:.0f} MB, peak {memory:.0f} MiB")
+        first = runs[0]
+        # Messages: 980 bytes of state, 73 bytes of pose, about 230 bytes of joints per cycle, before compression.
+        for target in ["copy.mcap", "copy.parquet", "copy.bag", "copy.csv"]:
+            out = folder / target
+            seconds, memory = run([BIN / "ravenpose", "convert", first, out])
+            print(f"convert {first.stat().st_size / 1e6:.0f} MB MCAP ({minutes * 60 / len(runs):.0f} s of states) to {target[5:]}: {seconds:.1f} s, "
+                  f"{first.stat().st_size / 1e6 / seconds:.0f} MB/s of file, {minutes * 60e3 / len(runs) * 980 / 1e6 / seconds:.0f} MB/s of state messages, "
+                  f"{out.stat().st_size / 1e6:.0f} MB written, peak {memory:.0f} MiB")
+            out.unlink()
+        seconds, memory = run([BIN / "ravenpose", "info", first])
+        print(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main()

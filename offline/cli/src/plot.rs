@@ -1,0 +1,31 @@
+//! `ravenpose plot`: an overview of a run as one page.
+
+use crate::output;
+use recordings::Recording;
+use recordings::open::{Opened, open};
+use recordings::table;
+use recordings::tidy::{self, StateTable};
+use std::path::Path;
+use std::process::ExitCode;
+
+pub(crate) fn run(input: &Path, out: &Path) -> Result<ExitCode, String> {
+    let recording = read(input)?;
+    let options = plot::Options::default();
+    let svg = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
+    let page = if svg { plot::overview_svg(&recording, &options) } else { plot::overview(&recording, &options) };
+    let page = page.map_err(|error| format!("{}: {error}", input.display()))?;
+    output::whole(out, |file| file.write_all(page.as_bytes()).map_err(|error| error.to_string()))?;
+    println!("{}: {} kB", out.display(), page.len() / 1000);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A recording of any format as a table in memory.
+pub(crate) fn read(input: &Path) -> Result<Recording, String> {
+    let name = input.display().to_string();
+    let recording = match open(input).map_err(|error| error.to_string())? {
+        Opened::Table(mut source) => table::collect(&name, source.as_mut()),
+        Opened::States(source) => StateTable::new(source, tidy::Options { arms: None, all_truth: false })
+            .and_then(|mut source| table::collect(&name, &mut source)),
+    };
+    recording.map_err(|error| error.to_string())
+}
