@@ -69,7 +69,8 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
     progress.end();
     let records = records.map_err(|error| error.to_string())?;
     if records == 0 {
-        let why = source.damage().map_or_else(|| "it holds no state".to_owned(), |damage| format!("{}: {}", damage.place, damage.what));
+        let why =
+            source.damage().map_or_else(|| "it holds no state".to_owned(), |damage| format!("{}: {}", damage.place, damage.what));
         return Err(format!("{}: {why}; nothing was written", input.display()));
     }
     sink.finish().map_err(|error| error.to_string())?;

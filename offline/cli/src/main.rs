@@ -141,17 +141,19 @@ fn main() -> ExitCode {
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
         Command::Record { out, seconds } => record::run(&out, seconds),
-        Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => simulate::run(&simulate::Wish {
-            minutes,
-            seed,
-            out: &out,
-            robot: robot.as_deref(),
-            arm: &arm,
-            motion: &motion,
-            format: &format,
-            run_minutes,
-            threads,
-        }),
+        Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => {
+            simulate::run(&simulate::Wish {
+                minutes,
+                seed,
+                out: &out,
+                robot: robot.as_deref(),
+                arm: &arm,
+                motion: &motion,
+                format: &format,
+                run_minutes,
+                threads,
+            })
+        }
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };

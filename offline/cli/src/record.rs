@@ -99,7 +99,10 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
             move || listen(&sender, stop)
         });
         let writing = scope.spawn(move || write(log, poses, &receiver));
-        while seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds) && !listening.is_finished() && !writing.is_finished() {
+        while seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds)
+            && !listening.is_finished()
+            && !writing.is_finished()
+        {
             if signals::wait(Duration::from_millis(50)) {
                 break;
             }
@@ -185,7 +188,8 @@ fn encode(pose: &CorrectedPose, out: &mut Vec<u8>) {
     }
     out.extend(pose.arms.to_le_bytes());
     out.extend(pose.runlevel.to_le_bytes());
-    for value in [pose.cycles, pose.lost, pose.skipped, pose.duplicates, pose.out_of_order, pose.refused, pose.late, pose.overruns] {
+    for value in [pose.cycles, pose.lost, pose.skipped, pose.duplicates, pose.out_of_order, pose.refused, pose.late, pose.overruns]
+    {
         out.extend(value.to_le_bytes());
     }
     pose.arm.iter().for_each(|arm| encode_arm(arm, out));
@@ -219,7 +223,10 @@ mod tests {
         };
         let (pose, arm) = POSE.definition.split_once("====").expect("two parts");
         let fields = |text: &str| -> usize {
-            text.lines().filter(|line| !line.contains("ravenpose/") && !line.contains('=')).map(|line| size(line.split(' ').next().expect("kind"))).sum()
+            text.lines()
+                .filter(|line| !line.contains("ravenpose/") && !line.contains('='))
+                .map(|line| size(line.split(' ').next().expect("kind")))
+                .sum()
         };
         let mut bytes = Vec::new();
         encode(&CorrectedPose::new(), &mut bytes);

@@ -6,8 +6,8 @@ use recordings::save::{self, StateFormat, TableFormat};
 use recordings::stream::Record;
 use recordings::tidy::{self, StateTable};
 use recordings::{open, table};
-use simulator::production::{Motion, Plan, Player, Run};
 use simulator::Robot;
+use simulator::production::{Motion, Plan, Player, Run};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -64,7 +64,14 @@ pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
     let offsets = all(&plan, &runs, &files, wish.threads)?;
     let text = summary_text(&plan, &runs, &files, &offsets);
     crate::output::whole(&summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
-    println!("{}: {} runs of {:.3} s, robot {}, seed {}", wish.out.display(), runs.len(), runs[0].duration_s, plan.robot.name, plan.seed);
+    println!(
+        "{}: {} runs of {:.3} s, robot {}, seed {}",
+        wish.out.display(),
+        runs.len(),
+        runs[0].duration_s,
+        plan.robot.name,
+        plan.seed
+    );
     Ok(ExitCode::SUCCESS)
 }
 
@@ -143,7 +150,8 @@ fn one(plan: &Plan, run: Run, file: &Path, cycles: &AtomicU64, stop: &AtomicBool
     let format = StateFormat::of_name(&states_file).ok_or_else(|| format!("{}: no format has this ending", file.display()))?;
     let mut sink = save::create_states(&states_file, format, &metadata).map_err(|error| error.to_string())?;
     player.records(|record| {
-        if matches!(record, Record::State(_)) && cycles.fetch_add(1, Ordering::Relaxed) % 1024 == 0 && stop.load(Ordering::Relaxed) {
+        if matches!(record, Record::State(_)) && cycles.fetch_add(1, Ordering::Relaxed) % 1024 == 0 && stop.load(Ordering::Relaxed)
+        {
             return Err("stopped".to_owned());
         }
         sink.write(record).map_err(|error| error.to_string())

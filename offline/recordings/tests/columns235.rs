@@ -100,7 +100,7 @@ fn what_the_text_does_not_hold_is_said() {
 /// A row of the older layout: joints first, tip position at 230 to 232.
 fn older_row() -> String {
     let mut cells: Vec<String> = (0..COLUMNS).map(|column| format!("{:.6}", column as f64 * 0.37)).collect();
-    cells[0] = "1566000000.000000".to_owned();
+    "1566000000.000000".clone_into(&mut cells[0]);
     for (column, um) in [(230, -77_925), (231, -20_268), (232, 13_113)] {
         cells[column] = format!("{um}.000000");
     }

@@ -11,7 +11,7 @@ use common::{Scratch, data};
 use recordings::csv::Table;
 use recordings::describe::{Description, describe, of_table};
 use recordings::stream::Record;
-use support::{Random, files_below, motion, record, truth_of, write};
+use support::{Random, files_below, is_table, motion, record, truth_of, write};
 
 fn of_text(text: &str) -> Description {
     let mut table = Table::from_bytes(Path::new("table.csv"), text.as_bytes()).expect("table");
@@ -46,7 +46,7 @@ fn the_real_recording_is_described_as_its_readme_does() {
     assert_eq!((timing.first_s, timing.last_s, timing.resolution_s), (0.0, 14.176, 0.001));
     assert_eq!((timing.repeated_times, timing.jumps_back), (0, 0));
     let motor = found.channels.iter().find(|channel| channel.name == "mpos_1_deg").expect("motor 1");
-    assert_eq!((motor.unit.as_str(), motor.first, motor.missing), ("deg", Some(4080.510254), 0));
+    assert_eq!((motor.unit.as_str(), motor.first, motor.missing), ("deg", Some(4_080.510_254), 0));
     // awk: 1.051 % of the rows have all three motors below 2.8648 deg/s.
     assert!((found.standstill[0].share - 0.01051).abs() < 1e-4, "{:?}", found.standstill);
     assert_eq!(found.saturation.len(), 3);
@@ -84,7 +84,7 @@ fn every_table_of_data_is_described() {
     let mut count = 0;
     for path in files_below(&data()) {
         let name = path.to_string_lossy().into_owned();
-        if name.ends_with(".csv") || name.ends_with(".csv.gz") {
+        if is_table(&path) {
             let found = describe(&path, &mut |_, _| {}).unwrap_or_else(|error| panic!("{error}"));
             check_shown(&found);
             assert!(found.streams[0].count > 0 && found.damage.is_none() && found.findings.is_empty(), "{name}: {found}");

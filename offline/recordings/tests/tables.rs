@@ -12,7 +12,7 @@ use recordings::open::{Opened, open};
 use recordings::save::{TableFormat, create_table};
 use recordings::stream::Place;
 use recordings::table::{self, Batch, ColumnCells, RecordingTable, TableSource};
-use support::{files_below, refused};
+use support::{files_below, is_table, refused};
 
 fn table(text: &str) -> Table {
     Table::from_bytes(Path::new("table.csv"), text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
@@ -191,10 +191,6 @@ fn check_round_trip(path: &Path, scratch: &Scratch) {
 
 #[test]
 fn every_table_of_data_goes_through_csv_and_parquet_without_loss() {
-    let is_table = |path: &Path| {
-        let name = path.to_string_lossy();
-        name.ends_with(".csv") || name.ends_with(".csv.gz")
-    };
     let files: Vec<_> = files_below(&data()).into_iter().filter(|path| is_table(path)).collect();
     if files.is_empty() {
         println!("skipped: {} is absent", data().display());

@@ -17,10 +17,18 @@ fn text(p: &[f64; COUNT]) -> String {
     let three = |at: usize| format!("[{:.5e}, {:.5e}, {:.5e}]", p[at], p[at + 1], p[at + 2]);
     let mut text = format!(
         "schema = \"ravenpose-robot/1\"\nname = \"raven2-uiuc-fit\"\nbase = \"raven2-nominal\"\n\n[plant.motor]\ninertia_capstan = {}\n\n[plant.friction]\nmotor_coulomb_nm = {}\nmotor_viscous_nm_s = {}\njoint_coulomb = {}\n",
-        three(6), three(0), three(3), three(9)
+        three(6),
+        three(0),
+        three(3),
+        three(9)
     );
     for joint in 0..3 {
-        let _ = write!(text, "\n[[effect]]\nphysics = \"motor_torque_scale\"\njoint = {}\nparameters = {{ d_0 = {:.2} }}\n", joint + 1, p[12 + joint]);
+        let _ = write!(
+            text,
+            "\n[[effect]]\nphysics = \"motor_torque_scale\"\njoint = {}\nparameters = {{ d_0 = {:.2} }}\n",
+            joint + 1,
+            p[12 + joint]
+        );
     }
     text
 }
@@ -66,8 +74,11 @@ fn main() {
     let robot = Robot::from_toml(&text(&p)).expect("robot");
     for (name, part) in [("fitted part", &train), ("rest", &rest), ("all", &record)] {
         let rms = Replay::new(&robot, Side::Gold).expect("plant").rms(part, WINDOW);
-        eprintln!("{name}: fitted {rms:.2?} rad, nominal {:.2?}, standing still {:.2?}",
-            Replay::new(&Robot::nominal(), Side::Gold).expect("plant").rms(part, WINDOW), standing_still_rms(part, WINDOW));
+        eprintln!(
+            "{name}: fitted {rms:.2?} rad, nominal {:.2?}, standing still {:.2?}",
+            Replay::new(&Robot::nominal(), Side::Gold).expect("plant").rms(part, WINDOW),
+            standing_still_rms(part, WINDOW)
+        );
     }
     print!("{}", text(&p));
 }

@@ -26,7 +26,11 @@ fn main() {
             for step_s in [1e-3, 0.5e-3, 0.25e-3] {
                 let (tips, speed) = run(method, step_s);
                 let off = tips.iter().zip(&reference).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-                println!("{name}, {method:?}, step {:.3} ms: {speed:.0} times real time, tip off by {:.2} um at most", step_s * 1e3, off * 1e6);
+                println!(
+                    "{name}, {method:?}, step {:.3} ms: {speed:.0} times real time, tip off by {:.2} um at most",
+                    step_s * 1e3,
+                    off * 1e6
+                );
             }
         }
     }

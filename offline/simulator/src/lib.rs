@@ -25,8 +25,8 @@
 pub mod controller;
 pub mod model;
 pub mod physics;
-pub mod production;
 pub mod plant;
+pub mod production;
 pub mod replay;
 pub mod simulation;
 pub mod trajectory;

@@ -22,11 +22,7 @@ pub(crate) fn build(robot: &Robot, side: Side, homing_offset: &Motors) -> Result
     let raven = &robot.raven;
     let numbers: Vec<DriveNumbers> = (0..FIRST).map(|joint| base_drive(robot, side, joint)).collect();
     let table = &raven.plant().transmission;
-    let coupling = [
-        vec![1.0, 0.0, 0.0],
-        vec![table.coupling_01, 1.0, 0.0],
-        vec![table.coupling_02, table.coupling_12, 1.0],
-    ];
+    let coupling = [vec![1.0, 0.0, 0.0], vec![table.coupling_01, 1.0, 0.0], vec![table.coupling_02, table.coupling_12, 1.0]];
     let integrator = &raven.plant().integrator;
     let mut plant = Plant::new(raven.rigid_body(side), &numbers, &coupling, Method::Rk4, integrator.substep_s)?;
     let drives = (FIRST..JOINTS).map(|joint| Drive::new(tool_drive(raven, side, joint))).collect();

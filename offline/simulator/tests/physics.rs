@@ -30,7 +30,9 @@ fn physics(name: &str, numbers: &[(&str, f64)]) -> Physics {
 /// Name, parameters of an effect that is not there, parameters of one that is, and where.
 fn cases() -> Vec<(Physics, Physics, Vec<Bound>)> {
     let joints = |last: usize| (0..last).map(Bound::Joint).collect::<Vec<_>>();
-    let case = |name: &str, none: &[(&str, f64)], some: &[(&str, f64)], bounds: Vec<Bound>| (physics(name, none), physics(name, some), bounds);
+    let case = |name: &str, none: &[(&str, f64)], some: &[(&str, f64)], bounds: Vec<Bound>| {
+        (physics(name, none), physics(name, some), bounds)
+    };
     let vector = |values: Vec<f64>| {
         let parameters = Parameters([("dpi_B".to_owned(), Value::Vector(values))].into());
         Physics::new("link_inertia", &parameters).expect("name").expect("parameters")
@@ -43,7 +45,12 @@ fn cases() -> Vec<(Physics, Physics, Vec<Bound>)> {
     vec![
         case("coulomb_friction", &[("f_c", 0.0)], &[("f_c", 0.8)], joints(7)),
         case("viscous_friction", &[("b", 0.0)], &[("b", 2.0)], joints(7)),
-        case("stribeck_friction", &[("f_c", 0.0), ("f_s", 0.0), ("v_s", 0.01)], &[("f_c", 0.5), ("f_s", 1.0), ("v_s", 0.01)], joints(7)),
+        case(
+            "stribeck_friction",
+            &[("f_c", 0.0), ("f_s", 0.0), ("v_s", 0.01)],
+            &[("f_c", 0.5), ("f_s", 1.0), ("v_s", 0.01)],
+            joints(7),
+        ),
         case("load_dependent_friction", &[("mu_l", 0.0)], &[("mu_l", 0.3)], joints(3)),
         case("backlash", &[("b", 0.0)], &[("b", 0.003)], joints(7)),
         case("cable_stretch", &[("k", 1e15)], &[("k", 800.0)], joints(3)),
@@ -51,7 +58,11 @@ fn cases() -> Vec<(Physics, Physics, Vec<Bound>)> {
         case("joint_coupling", &[("c_ij", 0.0)], &[("c_ij", 0.02)], vec![Bound::Pair(1, 0), Bound::Pair(2, 1), Bound::Pair(5, 4)]),
         case("payload", &[("m_p", 0.0)], &[("m_p", 0.2)], vec![Bound::Robot]),
         case("gravity_direction", &[], &[("b", 0.1)], vec![Bound::Robot]),
-        (vector(vec![0.0; 10]), vector(vec![0.1, 0.0, 0.02, 0.0, 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3]), (0..3).map(Bound::Link).collect()),
+        (
+            vector(vec![0.0; 10]),
+            vector(vec![0.1, 0.0, 0.02, 0.0, 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3]),
+            (0..3).map(Bound::Link).collect(),
+        ),
         case("motor_torque_scale", &[], &[("kappa", 0.8), ("d_0", 30.0)], joints(7)),
         case("torque_ripple", &[("amp", 0.0), ("order", 6.0)], &[("amp", 0.5), ("order", 6.0)], joints(7)),
         case("joint_offset", &[("o", 0.0)], &[("o", 0.005)], joints(7)),
@@ -93,7 +104,8 @@ fn names_and_parameters_are_those_of_the_vocabulary() {
     assert_eq!(ours, theirs);
     for entry in hypotheses.iter().filter(|entry| physical.contains(&entry["physics"].as_str().expect("name"))) {
         let name = entry["physics"].as_str().expect("name");
-        let ours: Vec<(&str, &str)> = parameters_of(name).expect("known").iter().map(|parameter| (parameter.name, parameter.unit)).collect();
+        let ours: Vec<(&str, &str)> =
+            parameters_of(name).expect("known").iter().map(|parameter| (parameter.name, parameter.unit)).collect();
         let theirs: Vec<(&str, &str)> = entry["parameters"]
             .as_array()
             .expect("parameters")
@@ -116,7 +128,8 @@ fn an_effect_of_size_zero_changes_nothing_and_one_of_size_shows() {
             let present = run(&[Effect::new(some, bound)]);
             let found = difference(&present, &nominal);
             assert!(found.iter().any(|difference| *difference > 1e-6), "{} on {bound:?}: {found:?}", some.name());
-            let finite = present.iter().all(|cycle| cycle.truth.joints.iter().chain(&cycle.reported.torque_nm).all(|x| x.is_finite()));
+            let finite =
+                present.iter().all(|cycle| cycle.truth.joints.iter().chain(&cycle.reported.torque_nm).all(|x| x.is_finite()));
             assert!(finite, "{} on {bound:?}", some.name());
         }
     }
@@ -198,7 +211,10 @@ fn the_same_seed_gives_the_same_bits_on_any_thread() {
     let here = make();
     let there = std::thread::spawn(make).join().expect("thread");
     let bits = |cycles: &[CycleOfArm]| -> Vec<u64> {
-        cycles.iter().flat_map(|cycle| cycle.truth.joints.map(f64::to_bits).into_iter().chain(cycle.reported.torque_nm.map(f64::to_bits))).collect()
+        cycles
+            .iter()
+            .flat_map(|cycle| cycle.truth.joints.map(f64::to_bits).into_iter().chain(cycle.reported.torque_nm.map(f64::to_bits)))
+            .collect()
     };
     assert_eq!(bits(&here), bits(&there));
 }

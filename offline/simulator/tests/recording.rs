@@ -44,7 +44,8 @@ fn longer_free_runs_of_the_nominal_plant_stay_closer_than_the_origins_simulator(
     let Some(record) = recording() else { return };
     let rms = |robot: &Robot, window| Replay::new(robot, Side::Gold).expect("plant").rms(&record, window);
     for window in [5000, 14_000] {
-        let (nominal, fitted, still) = (rms(&Robot::nominal(), window), rms(&fitted(), window), standing_still_rms(&record, window));
+        let (nominal, fitted, still) =
+            (rms(&Robot::nominal(), window), rms(&fitted(), window), standing_still_rms(&record, window));
         println!("{} s: nominal {nominal:.1?}, fitted {fitted:.1?}, standing still {still:.1?} rad RMS", window / 1000);
         for motor in 0..3 {
             // The origin's free run over the whole recording (issue 3). The fitted set was fitted over one second at a time: over

@@ -61,7 +61,9 @@ pub(crate) fn record(state: &RavenState) -> Record {
 
 /// Writes all records and completes the file.
 pub(crate) fn write(mut sink: Box<dyn Sink>, records: &[Record]) {
-    records.iter().for_each(|record| sink.write(record).unwrap_or_else(|error| panic!("{error}")));
+    for record in records {
+        sink.write(record).unwrap_or_else(|error| panic!("{error}"));
+    }
     sink.finish().unwrap_or_else(|error| panic!("{error}"));
 }
 
@@ -131,4 +133,11 @@ pub(crate) fn files_below(folder: &Path) -> Vec<PathBuf> {
     }
     found.sort();
     found
+}
+
+/// Is this one of the tables of data, by its name?
+pub(crate) fn is_table(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    Path::new(name).extension().is_some_and(|extension| extension == "csv")
 }

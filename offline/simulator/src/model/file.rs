@@ -148,8 +148,11 @@ fn effect(number: usize, table: &EffectTable) -> Result<Effect, RobotError> {
         from_s: table.from_s,
         to_s: table.to_s,
     };
-    Effect::given(&table.physics, &Parameters(values.collect()), &given)
-        .map_err(|what| RobotError::Effect { number, physics: table.physics.escape_debug().to_string(), what })
+    Effect::given(&table.physics, &Parameters(values.collect()), &given).map_err(|what| RobotError::Effect {
+        number,
+        physics: table.physics.escape_debug().to_string(),
+        what,
+    })
 }
 
 /// Tables are merged key by key, everything else is replaced; unknown keys are refused afterwards by the plant's own parser.
@@ -214,7 +217,9 @@ mod tests {
         assert!(effect("physics = \"backlash\"\nparameters = { b = 0.1 }").contains("needs `joint` = 1 to 7"));
         assert!(effect("physics = \"backlash\"\njoint = 8\nparameters = { b = 0.1 }").contains("`joint` is 8"));
         assert!(effect("physics = \"backlash\"\njoint = 1\nparameters = { b = -0.1 }").contains("`b` is -0.1"));
-        assert!(effect("physics = \"backlash\"\njoint = 1\nparameters = { width = 0.1 }").contains("no parameter `width`; it has b"));
+        assert!(
+            effect("physics = \"backlash\"\njoint = 1\nparameters = { width = 0.1 }").contains("no parameter `width`; it has b")
+        );
         assert!(effect("physics = \"payload\"\njoint = 1\nparameters = { m_p = 0.1 }").contains("takes no `joint`"));
         assert!(effect("physics = \"measurement_delay\"\nchannel = \"ear\"\nparameters = { d = 0.1 }").contains("must be one of"));
         assert!(effect("physics = \"payload\"\nfrom_s = 2.0\nto_s = 1.0\nparameters = { m_p = 0.1 }").contains("before to_s"));

@@ -27,7 +27,6 @@
 mod effect;
 mod file;
 
-
 pub(crate) use effect::delay;
 pub use effect::{Bound, Effect};
 
@@ -121,7 +120,14 @@ impl Robot {
     }
 
     fn of(raven: Raven2) -> Self {
-        Self { name: raven.plant().name.clone(), raven, cables: None, presliding: None, homing_offset_sd: [0.0; JOINTS], effects: Vec::new() }
+        Self {
+            name: raven.plant().name.clone(),
+            raven,
+            cables: None,
+            presliding: None,
+            homing_offset_sd: [0.0; JOINTS],
+            effects: Vec::new(),
+        }
     }
 
     /// A robot from the text of a plant file or a robot file.

@@ -13,10 +13,8 @@ pub struct CableCreep {
 
 impl CableCreep {
     /// Names and units.
-    pub const PARAMETERS: [Parameter; 2] = [
-        Parameter::needed("J_k", "rad/(N.m)|m/N", NOT_NEGATIVE),
-        Parameter::needed("T_k", "s", POSITIVE),
-    ];
+    pub const PARAMETERS: [Parameter; 2] =
+        [Parameter::needed("J_k", "rad/(N.m)|m/N", NOT_NEGATIVE), Parameter::needed("T_k", "s", POSITIVE)];
 
     /// From parameters by name.
     ///

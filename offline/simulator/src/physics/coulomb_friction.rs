@@ -13,10 +13,8 @@ pub struct CoulombFriction {
 
 impl CoulombFriction {
     /// Names and units.
-    pub const PARAMETERS: [Parameter; 2] = [
-        Parameter::needed("f_c", "N.m|N", NOT_NEGATIVE),
-        Parameter::optional("f_c_asym", "1", 0.0, (-1.0, 1.0)),
-    ];
+    pub const PARAMETERS: [Parameter; 2] =
+        [Parameter::needed("f_c", "N.m|N", NOT_NEGATIVE), Parameter::optional("f_c_asym", "1", 0.0, (-1.0, 1.0))];
 
     /// From parameters by name.
     ///

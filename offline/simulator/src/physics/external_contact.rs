@@ -45,7 +45,13 @@ impl ExternalContact {
             expected: "a direction".to_owned(),
             unit: "1",
         })?;
-        Ok(Self { k: parameters.number(k)?, f_max: parameters.number(f_max)?, x_0: parameters.number(x_0)?, p: parameters.number(p)?, n })
+        Ok(Self {
+            k: parameters.number(k)?,
+            f_max: parameters.number(f_max)?,
+            x_0: parameters.number(x_0)?,
+            p: parameters.number(p)?,
+            n,
+        })
     }
 
     /// Force on the tip at a place, N, frame 0.

@@ -15,8 +15,7 @@ pub struct GravityDirection {
 
 impl GravityDirection {
     /// Names and units.
-    pub const PARAMETERS: [Parameter; 2] =
-        [Parameter::optional("a", "rad", 0.0, ANY), Parameter::optional("b", "rad", 0.0, ANY)];
+    pub const PARAMETERS: [Parameter; 2] = [Parameter::optional("a", "rad", 0.0, ANY), Parameter::optional("b", "rad", 0.0, ANY)];
 
     /// From parameters by name.
     ///

@@ -14,8 +14,7 @@ pub struct ThermalDrift {
 
 impl ThermalDrift {
     /// Names and units.
-    pub const PARAMETERS: [Parameter; 2] =
-        [Parameter::needed("kappa_T", "1", (-5.0, 1.0)), Parameter::needed("T", "s", POSITIVE)];
+    pub const PARAMETERS: [Parameter; 2] = [Parameter::needed("kappa_T", "1", (-5.0, 1.0)), Parameter::needed("T", "s", POSITIVE)];
 
     /// No motor gets warmer than under twice its reference torque.
     const HEATING_MAX: f64 = 4.0;

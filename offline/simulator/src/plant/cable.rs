@@ -56,11 +56,7 @@ impl CableLaw {
                 } else {
                     (stretch_m.sinh(), stretch_m.cosh())
                 };
-                CableForce {
-                    force_n: 2.0 * ke_n * sinh,
-                    stiffness_n_m: 2.0 * ke_n * cosh,
-                    damping_ns_m: 2.0 * be_ns_m,
-                }
+                CableForce { force_n: 2.0 * ke_n * sinh, stiffness_n_m: 2.0 * ke_n * cosh, damping_ns_m: 2.0 * be_ns_m }
             }
             Self::Pretensioned { k_n_m, length_m, prestretch_m, be_ns_m } => {
                 let side = |stretch: f64| {

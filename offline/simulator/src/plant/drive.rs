@@ -216,9 +216,7 @@ impl Drive {
             contact = f64::min(contact, backlash.contact(taken));
         }
         let radius = self.nominal.radius_m;
-        let share = |known: f64| {
-            on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, radius * taken))
-        };
+        let share = |known: f64| on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, radius * taken));
         let mut found = match self.hysteresis.iter().find(|(cable, _)| cable.on) {
             None => {
                 let known = radius * radius * self.nominal.cable.at(0.0).stiffness_n_m;
@@ -228,11 +226,7 @@ impl Drive {
                 for stretch in on(&self.stretch) {
                     damping = stretch.damping(damping, share);
                 }
-                Elastic {
-                    torque: radius * cable.force_n,
-                    stiffness: share * radius * radius * cable.stiffness_n_m,
-                    damping,
-                }
+                Elastic { torque: radius * cable.force_n, stiffness: share * radius * radius * cable.stiffness_n_m, damping }
             }
             Some((cable, slot)) => {
                 let share = share(cable.effect.k);

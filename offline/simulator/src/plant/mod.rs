@@ -118,7 +118,13 @@ impl Plant {
     ///
     /// # Panics
     /// If `drives` or `coupling` do not have one entry per joint.
-    pub fn new(body: SerialArm, drives: &[DriveNumbers], coupling: &[Vec<f64>], method: Method, step_s: f64) -> Result<Self, PlantError> {
+    pub fn new(
+        body: SerialArm,
+        drives: &[DriveNumbers],
+        coupling: &[Vec<f64>],
+        method: Method,
+        step_s: f64,
+    ) -> Result<Self, PlantError> {
         let joints = body.joint_count();
         if joints > JOINTS_MAX {
             return Err(PlantError::Joints { found: joints });

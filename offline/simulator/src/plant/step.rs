@@ -52,13 +52,7 @@ impl Plant {
         let mut evaluation = Evaluation::ZERO;
         self.evaluate(state, applied, &mut evaluation);
         let (joints, motors) = self.accelerations_of(&evaluation);
-        Slope {
-            joints: state.rates,
-            rates: joints,
-            motors: state.speeds,
-            speeds: motors,
-            memories: evaluation.memory_rates,
-        }
+        Slope { joints: state.rates, rates: joints, motors: state.speeds, speeds: motors, memories: evaluation.memory_rates }
     }
 
     /// Motor rows are divided by the gear, which makes the cables' matrix symmetric: one Cholesky factor serves both stages.

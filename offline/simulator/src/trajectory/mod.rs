@@ -105,15 +105,19 @@ pub type Range = (f64, f64);
 
 /// Where trajectories go unless told otherwise: inside the command limits and inside insertion 0.25 to 0.44 m, where the tip
 /// keeps clear of the remote centre (raven2-plant.md, section 2).
-pub const WORKSPACE: [Range; JOINTS] = [
-    (0.25, 1.25),
-    (1.00, 2.15),
-    (0.25, 0.44),
-    (-1.2, 1.2),
-    (-0.8, 0.8),
-    (0.1, 1.0),
-    (0.1, 1.0),
-];
+pub const WORKSPACE: [Range; JOINTS] = [(0.25, 1.25), (1.00, 2.15), (0.25, 0.44), (-1.2, 1.2), (-0.8, 0.8), (0.1, 1.0), (0.1, 1.0)];
+
+/// Fastest commanded speeds, rad/s and m/s: what the clipped amplifiers can hold against the plant's viscous friction. Motor 3
+/// turns 2159 rad per metre and has 2.84e-3 N·m·s/rad against 0.54 N·m: 0.08 m/s is the end.
+pub const SPEED_MAX: [f64; JOINTS] = [0.75, 0.65, 0.055, 2.0, 2.0, 2.0, 2.0];
+
+/// Peak of a bell's speed over its mean.
+const BELL_PEAK: f64 = 1.875;
+
+/// Shortest duration of a bell between two postures, s.
+fn shortest_bell_s(from: &Joints, to: &Joints) -> f64 {
+    (0..JOINTS).map(|joint| BELL_PEAK * (to[joint] - from[joint]).abs() / SPEED_MAX[joint]).fold(0.0, f64::max)
+}
 
 #[cfg(test)]
 mod tests {

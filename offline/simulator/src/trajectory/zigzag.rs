@@ -3,7 +3,7 @@
 
 use arm::{JOINTS, Joints};
 
-use super::{Move, Range, Trajectory};
+use super::{Move, Range, SPEED_MAX, Trajectory, shortest_bell_s};
 use crate::random::Random;
 
 /// Rows per layer.
@@ -12,6 +12,8 @@ const ROWS: usize = 6;
 const LAYERS: usize = 3;
 /// Slowest and fastest crossing, as a share of the range per second.
 const SPEED: (f64, f64) = (0.08, 0.5);
+/// Share of a crossing over which it speeds up, and slows down.
+const RAMP: f64 = 0.1;
 
 /// At least `duration_s` of rows inside `ranges`, starting at `start`. Which joint is crossed, which stepped and which
 /// layered changes from block to block, as does the speed; the tool turns slowly from row to row.
@@ -50,13 +52,13 @@ fn block(random: &mut Random, from: Joints, ranges: &[Range; JOINTS]) -> Vec<Mov
             for joint in 3..JOINTS {
                 turn[joint] = part(joint, random.between(0.2, 0.8));
             }
-            let longest = (0..JOINTS).map(|joint| (turn[joint] - at[joint]).abs() / (ranges[joint].1 - ranges[joint].0));
-            let approach_s = (longest.fold(0.0, f64::max) / 0.6).max(0.5);
+            let approach_s = shortest_bell_s(&at, &turn).max(0.5);
             moves.push(Move { to: turn, duration_s: approach_s, rest_s: 0.0, ramp: 0.5 });
             let mut crossing = turn;
             crossing[crossed] = part(crossed, far);
-            let duration_s = ((1.0 - 2.0 * margin) / speed).max(0.5);
-            moves.push(Move { to: crossing, duration_s, rest_s: 0.0, ramp: 0.1 });
+            let fastest_s = (crossing[crossed] - turn[crossed]).abs() / (1.0 - RAMP) / SPEED_MAX[crossed];
+            let duration_s = ((1.0 - 2.0 * margin) / speed).max(fastest_s);
+            moves.push(Move { to: crossing, duration_s, rest_s: 0.0, ramp: RAMP });
             at = crossing;
         }
     }
@@ -71,8 +73,8 @@ mod tests {
     #[test]
     fn rows_are_crossed_at_constant_speed_both_ways_and_everything_stays_inside() {
         let start: Joints = std::array::from_fn(|joint| (WORKSPACE[joint].0 + WORKSPACE[joint].1) / 2.0);
-        let trajectory = zigzag(1, start, &WORKSPACE, 300.0);
-        assert!(trajectory.duration_s() >= 300.0);
+        let trajectory = zigzag(1, start, &WORKSPACE, 900.0);
+        assert!(trajectory.duration_s() >= 900.0);
         for step in trajectory.moves() {
             assert!((0..JOINTS).all(|joint| (WORKSPACE[joint].0..=WORKSPACE[joint].1).contains(&step.to[joint])), "{step:?}");
         }
