@@ -104,7 +104,10 @@ fn what_is_recorded_is_whole_and_in_order() {
         assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
         assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
         let missed = states.last().expect("states").sequence - states[0].sequence + 1 - states.len() as u64;
-        assert!(said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")), "{said}");
+        assert!(
+            said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")),
+            "{said}"
+        );
     });
     assert!(!out.with_extension("mcap.part").exists());
 }

@@ -168,13 +168,19 @@ fn bad_input_gets_one_line_and_nothing_is_left() {
     refused(&ravenpose(&["convert", text(&table), text(&folder.file("out.xyz"))]), "no format has this ending");
     refused(&ravenpose(&["convert", text(&table), text(&table)]), "both input and output");
     refused(&simulate(&folder.file("runs"), &["--run-minutes", "0"]), "--run-minutes 0");
-    refused(&ravenpose(&["simulate", "--minutes", "1", "--seed", "1", "--robot", "nowhere.toml", "--out", text(&folder.file("r"))]), "nowhere.toml");
+    refused(
+        &ravenpose(&["simulate", "--minutes", "1", "--seed", "1", "--robot", "nowhere.toml", "--out", text(&folder.file("r"))]),
+        "nowhere.toml",
+    );
     let robot = folder.file("robot.toml");
     let robot_text = "schema = \"ravenpose-robot/1\"\nname = \"x\"\nbase = \"raven2-nominal\"\n[[effect]]\nphysics = \"cable_creep\"\njoint = 5\nparameters = { J_k = 1e-4, T_k = 10 }\n";
     std::fs::write(&robot, robot_text).expect("robot");
     let robot = text(&robot).to_owned();
     let runs = folder.file("creep");
-    refused(&ravenpose(&["simulate", "--minutes", "0.01", "--seed", "1", "--robot", &robot, "--out", text(&runs)]), "cable_creep on joint 5");
+    refused(
+        &ravenpose(&["simulate", "--minutes", "0.01", "--seed", "1", "--robot", &robot, "--out", text(&runs)]),
+        "cable_creep on joint 5",
+    );
     assert_eq!(std::fs::read_dir(&runs).map_or(0, Iterator::count), 0);
 }
 

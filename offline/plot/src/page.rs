@@ -63,11 +63,12 @@ impl Page {
         for block in &self.blocks {
             match block {
                 Block::Heading(heading) => section = heading,
-                Block::Figures(figures) => {
-                    all.extend(
-                        figures.iter().map(|figure| Figure { title: format!("{section}: {}", figure.title), ..figure.clone() }),
-                    );
-                }
+                Block::Figures(figures) => all.extend(figures.iter().map(|figure| {
+                    // "Joints: Joint 1" says nothing more than "Joint 1".
+                    let said = figure.title.starts_with(section.trim_end_matches('s'));
+                    let title = if said { figure.title.clone() } else { format!("{section}: {}", figure.title) };
+                    Figure { title, ..figure.clone() }
+                })),
                 Block::Responsive(widths) => all.push(widths[0].clone()),
                 _ => {}
             }

@@ -178,6 +178,11 @@ fn every_section_is_there_with_units_on_its_axes() {
     ] {
         assert!(labels.contains(&label.to_owned()), "no {label}");
     }
+    let svg = overview_svg(&run(), &Options::default()).expect("SVG");
+    let titles = texts(&parsed(&svg), "text");
+    for title in ["Error against load: Joint 1", "Joint 1", "Distribution of the error: Tip"] {
+        assert!(titles.contains(&title.to_owned()), "figures alone say what they are: no {title}");
+    }
     assert!(html.contains("sensor"), "a channel without a role is drawn under its own name");
     let wide = document.descendants().filter(|node| node.attribute("class") == Some("wide")).count();
     let narrow = document.descendants().filter(|node| node.attribute("class") == Some("narrow")).count();

@@ -68,9 +68,10 @@ fn make(path: &Path, minutes: f64) -> Result<(), Failure> {
 
 fn read(path: &Path) -> Result<(), Failure> {
     let begin = Instant::now();
-    let mut source: Box<dyn Source> = match path.extension().is_some_and(|extension| extension == "mcap") {
-        true => Box::new(McapSource::open(path)?),
-        false => Box::new(RosbagSource::open(path)?),
+    let mut source: Box<dyn Source> = if path.extension().is_some_and(|extension| extension == "mcap") {
+        Box::new(McapSource::open(path)?)
+    } else {
+        Box::new(RosbagSource::open(path)?)
     };
     let (mut states, mut truths, mut sum) = (0_u64, 0_u64, 0_i64);
     while let Some(record) = source.next()? {

@@ -22,8 +22,8 @@ pub mod stream;
 pub mod table;
 
 pub mod mcap_file;
-pub mod ros;
 pub mod parquet_file;
+pub mod ros;
 pub mod rosbag_file;
 
 mod aside;
@@ -31,8 +31,8 @@ mod columns;
 mod fields;
 mod file;
 mod recording;
-mod text;
 pub mod sample;
+mod text;
 
 pub use recording::{Column, Recording, TextColumn};
 pub use states::{Arms, States};

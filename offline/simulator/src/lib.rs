@@ -21,6 +21,7 @@
 //! ```
 #![deny(missing_docs)]
 #![forbid(unsafe_code)]
+#![allow(clippy::needless_range_loop, reason = "joints index several vectors and matrices at once, as in the equations")]
 
 pub mod controller;
 pub mod model;

@@ -10,7 +10,7 @@ use simulator::trajectory::{WORKSPACE, teleoperation};
 use simulator::{Command, CycleOfArm, Robot, Simulation};
 
 fn start() -> Joints {
-    WORKSPACE.map(|(low, high)| (low + high) / 2.0)
+    WORKSPACE.map(|(low, high)| f64::midpoint(low, high))
 }
 
 /// Three seconds of motion of a robot with effects, seen every cycle; always with the same method and step.

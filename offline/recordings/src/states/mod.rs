@@ -10,7 +10,7 @@ use arm::{Arm, JOINTS, Joints, Side};
 use ravenpose_wire::RavenState;
 
 use crate::Recording;
-use crate::sample::{ArmSample, Cycle, ENCODER_OFFSETS, self};
+use crate::sample::{self, ArmSample, Cycle, ENCODER_OFFSETS};
 use channels::Channels;
 
 /// Which arms the states show.

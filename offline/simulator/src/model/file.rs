@@ -100,7 +100,7 @@ fn robot(text: &str) -> Result<Robot, RobotError> {
     merge(&mut plant, file.plant);
     let mut robot = Robot::of(Raven2::from_toml(&plant.to_string())?);
     robot.name = file.name;
-    robot.cables = file.cable.map(pretension).transpose()?;
+    robot.cables = file.cable.as_ref().map(pretension).transpose()?;
     if let Some(homing) = file.homing {
         let good = homing.offset_sd.iter().all(|sd| sd.is_finite() && *sd >= 0.0);
         require(good, "homing.offset_sd", "must hold numbers of 0 or more, rad and m")?;
@@ -115,7 +115,7 @@ fn robot(text: &str) -> Result<Robot, RobotError> {
     Ok(robot)
 }
 
-fn pretension(table: CableTable) -> Result<Pretension, RobotError> {
+fn pretension(table: &CableTable) -> Result<Pretension, RobotError> {
     let positive = |values: &[f64; 3]| values.iter().all(|value| value.is_finite() && *value > 0.0);
     require(positive(&table.stiffness_n_m), "cable.stiffness_n_m", "must hold numbers above 0")?;
     require(positive(&table.stiffening_length_m), "cable.stiffening_length_m", "must hold numbers above 0")?;

@@ -112,6 +112,9 @@ impl Robot {
     }
 
     /// A robot that is worn as the paper's was: `models/raven2-worn.toml`.
+    ///
+    /// # Panics
+    /// If the file that was embedded at build time is not a robot; a test reads it.
     pub fn worn() -> Self {
         match Self::from_toml(include_str!("../../../../models/raven2-worn.toml")) {
             Ok(robot) => robot,

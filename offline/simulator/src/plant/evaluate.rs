@@ -42,7 +42,7 @@ impl Evaluation {
 
 /// Where motors and joints stand against each other.
 pub(super) struct Deflection {
-    pub(super) deflection: Vector,
+    pub(super) position: Vector,
     pub(super) rate: Vector,
     /// Slope of the shift, by joint.
     pub(super) slope: Vector,
@@ -62,10 +62,10 @@ impl Plant {
         if self.shifted {
             slope = self.shift(&mut seen, &mut seen_rate);
         }
-        let mut found = Deflection { deflection: seen, rate: seen_rate, slope };
+        let mut found = Deflection { position: seen, rate: seen_rate, slope };
         for i in 0..n {
             for j in 0..n {
-                found.deflection[i] -= self.coupling[i][j] * state.joints[j];
+                found.position[i] -= self.coupling[i][j] * state.joints[j];
                 found.rate[i] -= self.coupling[i][j] * state.rates[j];
             }
         }
@@ -117,7 +117,7 @@ impl Plant {
         let mut torque = [0.0; JOINTS_MAX];
         for i in 0..n {
             let drive = &self.drives[i];
-            let cable = drive.elastic(found.deflection[i], found.rate[i], &state.memories);
+            let cable = drive.elastic(found.position[i], found.rate[i], &state.memories);
             torque[i] = cable.torque;
             out.stiffness[i] = cable.stiffness;
             out.damping[i] = cable.damping;
@@ -177,7 +177,7 @@ impl Plant {
         let found = self.deflections(state);
         let mut forces = [0.0; JOINTS_MAX];
         for (i, drive) in self.drives.iter().enumerate() {
-            let cable = drive.elastic(found.deflection[i], found.rate[i], &state.memories);
+            let cable = drive.elastic(found.position[i], found.rate[i], &state.memories);
             forces[i] = cable.torque / drive.nominal.radius_m;
         }
         forces
@@ -186,7 +186,7 @@ impl Plant {
     /// Cable stretch, m, and elastic-plus-damping force, N, as `vectors/plant.csv` has them.
     pub fn cable_stretch_m(&self, state: &State) -> Vector {
         let found = self.deflections(state);
-        std::array::from_fn(|i| if i < self.joints { found.deflection[i] * self.drives[i].nominal.radius_m } else { 0.0 })
+        std::array::from_fn(|i| if i < self.joints { found.position[i] * self.drives[i].nominal.radius_m } else { 0.0 })
     }
 
     /// Accelerations of joints and motors at a state under capstan torques, N·m.

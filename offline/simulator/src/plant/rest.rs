@@ -26,13 +26,13 @@ impl Plant {
             for i in 0..n {
                 let carried: f64 = (0..n).map(|k| coupling_inverse[k][i] * (gravity[k] - external[k])).sum();
                 let drive = &self.drives[i];
-                let cable = drive.elastic(found.deflection[i], 0.0, &state.memories);
+                let cable = drive.elastic(found.position[i], 0.0, &state.memories);
                 let wanted = carried - cable.torque;
                 // Inside a dead band the cable has a slope but no torque: step out of it.
                 missing[i] = wanted / cable.stiffness.max(1e-9);
                 if cable.torque == 0.0 && wanted != 0.0 {
                     let play: f64 = super::on(&drive.backlash).map(|backlash| backlash.b).sum();
-                    missing[i] += wanted.signum() * (play / 2.0 - found.deflection[i].abs()).max(0.0);
+                    missing[i] += wanted.signum() * (play / 2.0 - found.position[i].abs()).max(0.0);
                 }
             }
             let mut largest = 0.0_f64;
