@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-offline worn faults lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-offline worn faults fuzz lint clean
 
 all: build offline examples
 
@@ -92,6 +92,13 @@ bench-offline: offline
 # How far the shipped robots are off, over twenty homings.
 worn: offline
 	target/release/examples/worn
+
+# Every reader of files under cargo-fuzz, FUZZ_SECONDS each.
+FUZZ_SECONDS ?= 600
+fuzz:
+	command -v cargo-fuzz > /dev/null || $(CARGO) install --locked cargo-fuzz
+	for target in mcap rosbag ravenstate_message text_columns tidy_csv parquet statefile; do \
+	  RUSTC_BOOTSTRAP=1 $(CARGO) fuzz run $$target -- -max_total_time=$(FUZZ_SECONDS) -max_len=65536 || exit 1; done
 
 lint:
 	$(CARGO) fmt --all --check

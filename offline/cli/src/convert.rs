@@ -57,7 +57,9 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 fn note_all(losses: &[&str]) {
-    losses.iter().for_each(|loss| println!("note: {loss}"));
+    for loss in losses {
+        println!("note: {loss}");
+    }
 }
 
 fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, format: StateFormat) -> Result<Option<Damage>, String> {
@@ -101,7 +103,9 @@ fn table_to_table(mut source: Box<dyn TableSource>, out: &Path, format: TableFor
 fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) -> Result<(), String> {
     let recording = strict(input)?;
     let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
-    made.notes.iter().for_each(|note| println!("note: {note}"));
+    for note in &made.notes {
+        println!("note: {note}");
+    }
     note_all(format.losses());
     let metadata: Vec<(String, String)> = recording.metadata.clone().into_iter().collect();
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;

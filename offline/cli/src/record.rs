@@ -192,7 +192,9 @@ fn encode(pose: &CorrectedPose, out: &mut Vec<u8>) {
     {
         out.extend(value.to_le_bytes());
     }
-    pose.arm.iter().for_each(|arm| encode_arm(arm, out));
+    for arm in &pose.arm {
+        encode_arm(arm, out);
+    }
 }
 
 fn encode_arm(arm: &ArmPose, out: &mut Vec<u8>) {
@@ -202,9 +204,9 @@ fn encode_arm(arm: &ArmPose, out: &mut Vec<u8>) {
     out.extend(arm.reset_count.to_le_bytes());
     out.extend(arm.domain_score.to_le_bytes());
     for vector in [arm.raw_position_um, arm.correction_um, arm.corrected_position_um, arm.bound95_um] {
-        vector.iter().for_each(|value| out.extend(value.to_le_bytes()));
+        out.extend(vector.iter().flat_map(|value| value.to_le_bytes()));
     }
-    arm.orientation.iter().for_each(|value| out.extend(value.to_le_bytes()));
+    out.extend(arm.orientation.iter().flat_map(|value| value.to_le_bytes()));
     out.extend(arm.hold_cycles.to_le_bytes());
 }
 

@@ -122,7 +122,9 @@ fn all(plan: &Plan, runs: &[Run], files: &[PathBuf], threads: Option<usize>) -> 
     });
     progress.end();
     if let Some(message) = lock(&failure).take() {
-        files.iter().for_each(|file| drop(std::fs::remove_file(file)));
+        for file in files {
+            drop(std::fs::remove_file(file));
+        }
         return Err(message);
     }
     Ok(std::mem::take(&mut *lock(&offsets)))
@@ -150,7 +152,9 @@ fn one(plan: &Plan, run: Run, file: &Path, cycles: &AtomicU64, stop: &AtomicBool
     let format = StateFormat::of_name(&states_file).ok_or_else(|| format!("{}: no format has this ending", file.display()))?;
     let mut sink = save::create_states(&states_file, format, &metadata).map_err(|error| error.to_string())?;
     player.records(|record| {
-        if matches!(record, Record::State(_)) && cycles.fetch_add(1, Ordering::Relaxed) % 1024 == 0 && stop.load(Ordering::Relaxed)
+        if matches!(record, Record::State(_))
+            && cycles.fetch_add(1, Ordering::Relaxed).is_multiple_of(1024)
+            && stop.load(Ordering::Relaxed)
         {
             return Err("stopped".to_owned());
         }

@@ -19,11 +19,8 @@ impl World {
     fn new(name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("ravenpose-record-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).expect("folder");
-        let settings = Settings {
-            prefix: format!("rprec{name}{}_", std::process::id()),
-            root: format!("{}/iceoryx2/", folder.display()),
-            ..Settings::from_env()
-        };
+        let settings =
+            Settings { prefix: format!("rprec{name}{}_", std::process::id()), root: format!("{}/iceoryx2/", folder.display()) };
         Self { folder, settings }
     }
 

@@ -137,7 +137,7 @@ fn every_recording_beside_the_repository_is_described_and_converted() {
             let name = path.to_string_lossy().into_owned();
             if path.is_dir() {
                 folders.push(path);
-            } else if name.ends_with(".csv") || name.ends_with(".csv.gz") {
+            } else if name.contains(".csv") {
                 files.push(path);
             }
         }

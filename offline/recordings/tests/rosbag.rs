@@ -267,6 +267,23 @@ fn a_definition_that_lacks_a_field_is_refused_by_its_name() {
     assert!(error.contains("the definition of raven_2/raven_state on /ravenstate lacks field jpos_d; record with"), "{error}");
 }
 
+#[test]
+fn damage_in_an_uncompressed_chunk_has_its_byte() {
+    let states = states(38);
+    let records = recorded(&states);
+    let whole = [start(), chunk("none", records.len(), &records)].concat();
+    let third = encoded(&states[2]);
+    let message_at = whole.windows(third.len()).position(|bytes| bytes == third).expect("there") - message(0, 2, &[]).len();
+    let mut spoilt = whole.clone();
+    // The length of its header.
+    spoilt[message_at + 3] = 0x7f;
+    let (found, damage, error) = outcome(&spoilt);
+    assert_eq!((found.len(), error), (2, None));
+    let expected =
+        Damage { place: Place::Byte(message_at as u64), what: "a record in a chunk is longer than the rest of the chunk".into() };
+    assert_eq!(damage, Some(expected));
+}
+
 /// Bags whose lengths and numbers are lies.
 fn liars() -> Vec<Vec<u8>> {
     let huge = u32::MAX.to_le_bytes();

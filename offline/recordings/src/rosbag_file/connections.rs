@@ -17,8 +17,7 @@ pub(super) struct Connections {
 
 #[derive(Debug)]
 struct Connection {
-    /// What the connection says, as it stood.
-    data: Vec<u8>,
+    definition: String,
     channel: KnownChannel,
 }
 
@@ -34,20 +33,21 @@ impl Connections {
         let (Some(id), Some(topic)) = (fields.u32("conn"), fields.text("topic")) else {
             return refused("a connection does not fit the format".into());
         };
+        let said = Fields(data);
+        let (Some(type_name), Some(definition)) = (said.text("type"), said.text("message_definition")) else {
+            return refused(format!("the connection of {topic} does not say the type of its messages"));
+        };
         if let Some(known) = self.known.get(&id) {
-            let is_same = known.data == data && known.channel.shown.topic == topic;
+            let shown = &known.channel.shown;
+            let is_same = (&shown.topic, &shown.type_name, &known.definition) == (&topic, &type_name, &definition);
             return if is_same { Ok(()) } else { refused(format!("connection {id} is defined a second time, differently")) };
         }
         self.text_bytes = self.text_bytes.saturating_add(fields.0.len() + data.len());
         if self.known.len() == CHANNELS_MAX || self.text_bytes > TEXT_MAX {
             return refused(format!("more than {CHANNELS_MAX} connections or {TEXT_MAX} bytes of definitions"));
         }
-        let said = Fields(data);
-        let (Some(type_name), Some(definition)) = (said.text("type"), said.text("message_definition")) else {
-            return refused(format!("the connection of {topic} does not say the type of its messages"));
-        };
         let channel = KnownChannel::ros1(topic, type_name, &definition, at, &mut self.state_topic)?;
-        let _ = self.known.insert(id, Connection { data: data.to_vec(), channel });
+        let _ = self.known.insert(id, Connection { definition, channel });
         Ok(())
     }
 

@@ -26,6 +26,13 @@ pub struct RosbagSource<R = BufReader<File>> {
     damage: Option<Damage>,
 }
 
+impl Chunk {
+    /// Where the record at hand begins in the file, or else the chunk that it is in.
+    fn place(&self) -> u64 {
+        self.records_at.map_or(self.begin, |records_at| records_at + self.at as u64)
+    }
+}
+
 /// What the bag's first record says; 0 where the bag was never closed.
 #[derive(Debug, Clone, Copy, Default)]
 struct BagHeader {
@@ -51,6 +58,8 @@ struct Chunk {
     begin: u64,
     records: Vec<u8>,
     at: usize,
+    /// Where `records` stand in the file, where they stand there as they are.
+    records_at: Option<u64>,
     /// Why there is nothing after `records`.
     cut: Option<Damage>,
 }
@@ -189,6 +198,7 @@ impl<R: Read> RosbagSource<R> {
         self.chunk.begin = head.at;
         self.chunk.at = 0;
         self.chunk.records.clear();
+        self.chunk.records_at = (how == Compression::None).then(|| self.framing.progress().0);
         // The last chunk of a bag that was never closed says 0 bytes; uncompressed, its records simply follow.
         if head.length == 0 && size == 0 {
             return if how == Compression::None { Ok(()) } else { self.open_rest(how) };
@@ -203,6 +213,9 @@ impl<R: Read> RosbagSource<R> {
             salvage(how, &self.buffer, HELD_MAX, &mut self.chunk.records);
             self.chunk.cut = Some(cut(head));
             return Ok(());
+        }
+        if how == Compression::None && u64::from(size) != head.length {
+            return Err(Stop::damage(head.at, format!("a chunk says {size} bytes and has {}", head.length)));
         }
         let whole = self.decompressor.whole(how, &self.buffer, size as usize, &mut self.chunk.records);
         whole.map_err(|what| Stop::damage(head.at, format!("a chunk {what}")))
@@ -220,12 +233,15 @@ impl<R: Read> RosbagSource<R> {
         let mut chunk = std::mem::take(&mut self.chunk);
         let taken = match Inner::split(chunk.records.get(chunk.at..).unwrap_or_default()) {
             Some(inner) => {
-                let taken = self.record(inner.fields, inner.data, chunk.begin);
+                let taken = self.record(inner.fields, inner.data, chunk.place());
                 chunk.at += inner.size;
                 taken
             }
             None => Err(Stop::Damage(
-                chunk.cut.take().unwrap_or_else(|| damage(chunk.begin, "a record in a chunk is longer than the rest of the chunk")),
+                chunk
+                    .cut
+                    .take()
+                    .unwrap_or_else(|| damage(chunk.place(), "a record in a chunk is longer than the rest of the chunk")),
             )),
         };
         self.chunk = chunk;
