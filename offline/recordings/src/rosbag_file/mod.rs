@@ -6,6 +6,7 @@
 //!
 //! Written are chunks of 768 KiB before compression, none or lz4, with the index that ROS's own tools want.
 
+mod chunk;
 mod connections;
 mod framing;
 mod index;

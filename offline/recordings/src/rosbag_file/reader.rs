@@ -4,8 +4,9 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use super::chunk::Chunk;
 use super::connections::Connections;
-use super::framing::{Fields, Framing, Head, Inner};
+use super::framing::{Fields, Framing, Head};
 use super::{MAGIC, op};
 use crate::ros::{Assembler, Compression, Decompressor, HELD_MAX, Stop, damage, refused, salvage, settle, unreadable};
 use crate::stream::{Channel, Damage, Record, Source, StreamError};
@@ -26,13 +27,6 @@ pub struct RosbagSource<R = BufReader<File>> {
     damage: Option<Damage>,
 }
 
-impl Chunk {
-    /// Where the record at hand begins in the file, or else the chunk that it is in.
-    fn place(&self) -> u64 {
-        self.records_at.map_or(self.begin, |records_at| records_at + self.at as u64)
-    }
-}
-
 /// What the bag's first record says; 0 where the bag was never closed.
 #[derive(Debug, Clone, Copy, Default)]
 struct BagHeader {
@@ -49,19 +43,6 @@ struct Seen {
     chunk_infos: u32,
     /// A message that is no metadata.
     message: bool,
-}
-
-/// The chunk at hand.
-#[derive(Default)]
-struct Chunk {
-    /// Where it begins in the file, bytes.
-    begin: u64,
-    records: Vec<u8>,
-    at: usize,
-    /// Where `records` stand in the file, where they stand there as they are.
-    records_at: Option<u64>,
-    /// Why there is nothing after `records`.
-    cut: Option<Damage>,
 }
 
 impl RosbagSource {
@@ -108,8 +89,7 @@ impl<R: Read> RosbagSource<R> {
 
     /// Reads one record, of the file or of the chunk at hand. Damage and errors end the stream here.
     fn advance(&mut self) -> Result<(), StreamError> {
-        let in_chunk = self.chunk.at < self.chunk.records.len() || self.chunk.cut.is_some();
-        let stopped = if in_chunk { self.inner() } else { self.outer() };
+        let stopped = if self.chunk.is_open() { self.inner() } else { self.outer() };
         let Err(stop) = stopped else { return Ok(()) };
         self.chunk = Chunk::default();
         self.end();
@@ -231,21 +211,13 @@ impl<R: Read> RosbagSource<R> {
 
     fn inner(&mut self) -> Result<(), Stop> {
         let mut chunk = std::mem::take(&mut self.chunk);
-        let taken = match Inner::split(chunk.records.get(chunk.at..).unwrap_or_default()) {
-            Some(inner) => {
-                let taken = self.record(inner.fields, inner.data, chunk.place());
-                chunk.at += inner.size;
-                taken
-            }
-            None => Err(Stop::Damage(
-                chunk
-                    .cut
-                    .take()
-                    .unwrap_or_else(|| damage(chunk.place(), "a record in a chunk is longer than the rest of the chunk")),
-            )),
-        };
+        let taken = chunk.record().map_err(Stop::Damage).and_then(|inner| {
+            self.record(inner.fields, inner.data, chunk.place())?;
+            Ok(inner.size)
+        });
+        chunk.at += *taken.as_ref().unwrap_or(&0);
         self.chunk = chunk;
-        taken
+        taken.map(|_| ())
     }
 
     /// A connection or a message, from the file or from a chunk that begins at this byte.

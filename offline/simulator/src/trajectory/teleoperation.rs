@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn half_an_hour_traverses_the_workspace_and_stay_inside() {
-        let start: Joints = std::array::from_fn(|joint| (WORKSPACE[joint].0 + WORKSPACE[joint].1) / 2.0);
+        let start: Joints = std::array::from_fn(|joint| f64::midpoint(WORKSPACE[joint].0, WORKSPACE[joint].1));
         let trajectory = teleoperation(3, start, &WORKSPACE, 1800.0);
         let mut cells = std::collections::HashSet::new();
         let (mut still, mut count) = (0, 0);

@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn rows_are_crossed_at_constant_speed_both_ways_and_everything_stays_inside() {
-        let start: Joints = std::array::from_fn(|joint| (WORKSPACE[joint].0 + WORKSPACE[joint].1) / 2.0);
+        let start: Joints = std::array::from_fn(|joint| f64::midpoint(WORKSPACE[joint].0, WORKSPACE[joint].1));
         let trajectory = zigzag(1, start, &WORKSPACE, 900.0);
         assert!(trajectory.duration_s() >= 900.0);
         for step in trajectory.moves() {
