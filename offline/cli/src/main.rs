@@ -5,6 +5,7 @@ mod convert;
 mod infer;
 mod info;
 mod output;
+mod pair;
 mod plot;
 mod progress;
 mod record;
@@ -65,6 +66,20 @@ enum Command {
         /// Page to write (.html), or the figures alone (.svg)
         #[arg(long)]
         out: PathBuf,
+    },
+    /// Reported and true tip positions of the same moments: clock offset and drift, registration, labels, what was dropped
+    Pair {
+        /// Recording with the reported tip
+        run: PathBuf,
+        /// Recording with the true tip (vision's truth.csv); without it the truth is in RUN
+        #[arg(long)]
+        truth: Option<PathBuf>,
+        /// Table of pairs to write; the report goes beside it as .report.json
+        #[arg(long)]
+        out: PathBuf,
+        /// The truth is on the states' clock and in frame 0 already
+        #[arg(long)]
+        same: bool,
     },
     /// Log the running service's states and poses to MCAP, on one clock; a kill loses at most the last second
     Record {
@@ -140,6 +155,7 @@ fn main() -> ExitCode {
         Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
+        Command::Pair { run, truth, out, same } => pair::run(&run, truth.as_deref(), &out, same),
         Command::Record { out, seconds } => record::run(&out, seconds),
         Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {

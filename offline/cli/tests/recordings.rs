@@ -104,6 +104,33 @@ fn a_simulated_run_has_every_state_and_its_truth_and_converts_to_everything() {
 }
 
 #[test]
+fn pairs_of_a_simulated_run_are_its_error() {
+    let folder = Folder::new("pairs");
+    let out = folder.file("runs");
+    assert!(simulate(&out, &[]).status.success());
+    let table = folder.file("pairs.csv");
+    let output = ravenpose(&["pair", text(&out.join("run_0001.mcap")), "--same", "--out", text(&table)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let lines = std::fs::read_to_string(&table).expect("pairs");
+    let rows: Vec<Vec<f64>> = lines
+        .lines()
+        .filter(|line| line.starts_with(|first: char| first.is_ascii_digit()))
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("number")).collect())
+        .collect();
+    assert!(rows.len() > 100, "{}", rows.len());
+    for row in &rows {
+        for axis in 0..3 {
+            assert!((row[5 + axis] - row[2 + axis] - row[8 + axis]).abs() < 2e-6, "{row:?}");
+        }
+    }
+    let largest = rows.iter().map(|row| row[8..].iter().map(|label| label * label).sum::<f64>().sqrt()).fold(0.0, f64::max);
+    assert!((0.5..15.0).contains(&largest), "{largest} mm");
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.file("pairs.report.json")).expect("report")).expect("JSON");
+    assert_eq!(report["pairs"].as_u64(), Some(rows.len() as u64));
+}
+
+#[test]
 fn a_cut_recording_gives_what_stands_before_the_cut_and_says_where() {
     let folder = Folder::new("cut");
     let out = folder.file("runs");

@@ -7,8 +7,16 @@ use crate::csv;
 use crate::stream::{Damage, StreamError};
 use crate::{Column, Recording, TextColumn};
 
-/// Rows of a full batch.
+/// Rows of a full batch of a table of usual width.
 pub const BATCH_ROWS: usize = 1024;
+
+/// Cells of a batch at most, but for one row.
+const BATCH_CELLS: usize = 1 << 20;
+
+/// Rows of a full batch: fewer for a very wide table, so that memory stays bounded whatever the file says.
+pub fn rows_of_batch(columns: usize) -> usize {
+    (BATCH_CELLS / columns.max(1)).clamp(1, BATCH_ROWS)
+}
 
 /// A column's name and kind.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -115,7 +123,7 @@ impl Batch {
     /// An empty batch for these columns.
     pub fn new(columns: &[TableColumn]) -> Self {
         let cells = |column: &TableColumn| {
-            if column.text { ColumnCells::Texts(Texts::default()) } else { ColumnCells::Numbers(Vec::with_capacity(BATCH_ROWS)) }
+            if column.text { ColumnCells::Texts(Texts::default()) } else { ColumnCells::Numbers(Vec::new()) }
         };
         Self { columns: columns.iter().map(cells).collect() }
     }

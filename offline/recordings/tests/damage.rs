@@ -20,7 +20,7 @@ use recordings::table::{Batch, ColumnCells};
 use support::{Random, files_below, motion, one_line, record, truth_of, write};
 
 /// Bytes of a file that are damaged at most, so that a debug build stays fast.
-const BYTES_MAX: usize = 300_000;
+const BYTES_MAX: usize = 100_000;
 
 /// One way to damage a file.
 fn damaged(bytes: &[u8], random: &mut Random) -> Vec<u8> {
@@ -78,7 +78,7 @@ fn damaged_copies_of_every_file_of_data_are_refused_or_read_up_to_the_damage() {
         let mut bytes = std::fs::read(&original).expect("file");
         bytes.truncate(BYTES_MAX);
         let name = original.file_name().expect("name").to_string_lossy().into_owned();
-        for _ in 0..6 {
+        for _ in 0..4 {
             let path = scratch.file(&name, &damaged(&bytes, &mut random));
             if check(&path) { read += 1 } else { refused += 1 }
         }
@@ -120,11 +120,11 @@ fn damaged_states_are_refused_or_read_up_to_the_damage() {
     for original in of_each_format(&scratch) {
         let bytes = std::fs::read(&original).expect("file");
         let mut read = 0;
-        for _ in 0..120 {
+        for _ in 0..80 {
             std::fs::write(&original, damaged(&bytes, &mut random)).expect("file");
             read += usize::from(check(&original));
         }
-        println!("{}: {read} of 120 read", original.display());
+        println!("{}: {read} of 80 read", original.display());
         assert!(read > 0, "{}", original.display());
     }
 }

@@ -31,7 +31,7 @@ fn of_data(file: &str) -> Option<Description> {
 fn check_shown(description: &Description) -> String {
     let text = description.to_string();
     for line in text.lines().filter(|line| !line.contains(&description.file)) {
-        assert!(line.chars().count() <= 120, "{line}");
+        assert!(line.chars().count() <= 100, "{line}");
     }
     text
 }

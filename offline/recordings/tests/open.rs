@@ -102,7 +102,7 @@ fn every_file_of_data_is_opened_or_named() {
                 "is a .md document",
                 "is a .json document",
                 "is a .toml document",
-                "is a .urdf document",
+                "looks like an XML document",
             ];
             assert!(known.iter().any(|known| text.starts_with(known)), "{}: {text}", path.display());
         }
@@ -137,7 +137,7 @@ fn what_is_compressed_or_missing_is_said() {
     assert_eq!(refusal("a.csv.gz", b"t_s,x_mm\n"), "is named .gz but is not gzip; rename it without .gz or compress it");
     assert_eq!(
         refusal("a.csv.gz", &gzip(b"t_s")[..12]),
-        "the gzip stream is damaged (unexpected end of file); copy the file again"
+        "line 1: the gzip stream is damaged or cut short (incomplete deflate stream); copy or compress the file again"
     );
     assert_eq!(refusal("empty.csv", b""), "is empty; record at least one sample");
     assert_eq!(

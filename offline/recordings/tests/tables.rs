@@ -237,3 +237,19 @@ fn a_recording_in_memory_goes_out_and_comes_back() {
     let names: Vec<&str> = source.columns().iter().map(|column| column.name.as_str()).collect();
     assert_eq!(names, ["t_s", "status", "x_m"]);
 }
+
+#[test]
+fn very_wide_tables_and_quotes_without_end_cost_no_more_than_their_size() {
+    // A megabyte of columns of one name, then of one meaning.
+    let same = "a,".repeat(200_000) + "a";
+    let source = table(&format!("{same}\n"));
+    assert_eq!(source.columns().len(), 200_001);
+    assert_eq!(source.findings().len(), 21);
+    let meaning: Vec<String> = (1..60_000).map(|zeros| format!("mpos_{}1_deg", "0".repeat(zeros % 9))).collect();
+    let mut source = table(&format!("{}\n", meaning.join(",")));
+    assert_eq!(table::collect("wide", &mut source).expect("table").columns.len(), 59_999);
+    let open = format!("note,n\n\"{}", "1\n".repeat(400_000));
+    let mut source = table(&open);
+    assert_eq!(cells(&mut source)[0].len(), 0);
+    assert_eq!(source.damage().expect("damage").what, "a quoted cell is not closed before the end of the file");
+}

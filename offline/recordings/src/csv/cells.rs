@@ -6,12 +6,19 @@ use crate::file::Lines;
 
 /// Reads the further lines of a row in which a quoted cell goes over several.
 pub(super) fn complete_row(lines: &mut Lines) -> Result<(), String> {
-    while lines.line().split(|byte| *byte == b'"').count() % 2 == 0 {
+    let (mut seen, mut quotes) = (0, 0);
+    loop {
+        // Only what was appended is looked at: a quote that is never closed must not cost the square of the file.
+        let line = lines.line();
+        quotes += line.get(seen..).unwrap_or_default().split(|byte| *byte == b'"').count() - 1;
+        seen = line.len();
+        if quotes % 2 == 0 {
+            return Ok(());
+        }
         if !lines.append().map_err(|problem| problem.what())? {
             return Err("a quoted cell is not closed before the end of the file".to_owned());
         }
     }
-    Ok(())
 }
 
 /// The present row as text.

@@ -1,5 +1,7 @@
 //! Column names of tidy CSV: `QUANTITY[_INDEX]_UNIT`, in any case, with an optional prefix `sim_`.
 
+use std::collections::HashSet;
+
 use super::error::CsvProblem;
 
 /// What a column of the file becomes.
@@ -103,12 +105,15 @@ pub(super) fn field(name: &str, origin_names: bool) -> Result<Field, CsvProblem>
 /// Every column of a header; what the table of tidy CSV cannot take stays as it is in the file.
 pub(crate) fn loose_fields(names: &[&str]) -> Vec<Field> {
     let origin_names = has_origin_names(names);
+    let in_file: HashSet<&str> = names.iter().copied().collect();
+    let mut taken: HashSet<String> = HashSet::new();
     let mut fields: Vec<Field> = Vec::with_capacity(names.len());
     for name in names {
         let found = field(name, origin_names).unwrap_or_else(|_| unknown(name));
-        let is_taken =
-            found.name != *name && (names.contains(&found.name.as_str()) || fields.iter().any(|other| other.name == found.name));
-        fields.push(if is_taken { unknown(name) } else { found });
+        let is_taken = found.name != *name && (in_file.contains(found.name.as_str()) || taken.contains(&found.name));
+        let found = if is_taken { unknown(name) } else { found };
+        taken.insert(found.name.clone());
+        fields.push(found);
     }
     fields
 }

@@ -5,6 +5,7 @@
 //! by [`Table::findings`](TableSource::findings). A file without a header is still refused.
 
 use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::cells::{self, Split};
@@ -12,7 +13,7 @@ use super::error::CsvProblem;
 use super::kinds::{self, Kinds};
 use crate::file::{Input, InputProblem, LineProblem, Lines, refusal};
 use crate::stream::{Damage, Place, StreamError};
-use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
+use crate::table::{Batch, ColumnCells, TableColumn, TableSource, rows_of_batch};
 
 /// A CSV file being read as a table.
 pub struct Table {
@@ -132,7 +133,8 @@ impl TableSource for Table {
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, StreamError> {
         batch.clear();
-        while !self.done && batch.rows() < BATCH_ROWS {
+        let rows = rows_of_batch(self.columns.len());
+        while !self.done && batch.rows() < rows {
             match self.row(batch) {
                 Ok(true) => {}
                 Ok(false) => self.done = true,
@@ -162,6 +164,9 @@ impl TableSource for Table {
     }
 }
 
+/// Pairs of metadata that are kept: more is no metadata.
+const METADATA_MAX: usize = 10_000;
+
 /// What stands above the rows.
 struct Head {
     path: PathBuf,
@@ -190,6 +195,7 @@ impl Head {
             let comment = String::from_utf8_lossy(comment);
             if let Some((key, value)) = comment.split_once('=').map(|(key, value)| (key.trim(), value.trim()))
                 && !key.is_empty()
+                && self.metadata.len() < METADATA_MAX
             {
                 self.metadata.push((key.to_owned(), value.to_owned()));
             }
@@ -211,26 +217,36 @@ impl Head {
     }
 }
 
+/// Mended names that are told one by one.
+const MENDED_TOLD: usize = 20;
+
 /// Columns with a name each that no other has, and what had to be done for it.
 fn distinct(names: Vec<String>) -> (Vec<TableColumn>, Vec<String>) {
-    let mut taken: std::collections::HashSet<String> = names.iter().cloned().collect();
-    let mut seen = std::collections::HashSet::new();
-    let mut findings = Vec::new();
+    let mut taken: HashSet<String> = names.iter().cloned().collect();
+    let mut seen = HashSet::new();
+    let mut copies: HashMap<String, u64> = HashMap::new();
+    let (mut findings, mut mended) = (Vec::new(), 0);
     let mut columns = Vec::with_capacity(names.len());
     for (place, name) in names.into_iter().enumerate() {
         let wanted = if name.is_empty() { format!("column_{}", place + 1) } else { name.clone() };
         let mut unique = wanted.clone();
-        let mut copy = 2;
         while seen.contains(&unique) || (unique != name && taken.contains(&unique)) {
+            let copy = copies.entry(wanted.clone()).or_insert(1);
+            *copy += 1;
             unique = format!("{wanted}_copy{copy}");
-            copy += 1;
         }
         if unique != name {
-            findings.push(format!("column {} `{}` was named `{}`", place + 1, name.escape_debug(), unique.escape_debug()));
+            mended += 1;
+            if mended <= MENDED_TOLD {
+                findings.push(format!("column {} `{}` was named `{}`", place + 1, name.escape_debug(), unique.escape_debug()));
+            }
+            taken.insert(unique.clone());
         }
         seen.insert(unique.clone());
-        taken.insert(unique.clone());
         columns.push(TableColumn::number(unique));
+    }
+    if mended > MENDED_TOLD {
+        findings.push(format!("{} more columns were named anew", mended - MENDED_TOLD));
     }
     (columns, findings)
 }

@@ -18,6 +18,7 @@ pub use write::Writer;
 
 pub(crate) use header::{is_si_name, loose_fields, unit_of_name};
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use header::Field;
@@ -123,9 +124,10 @@ impl<'a> Reader<'a> {
         check_names(names).map_err(|problem| self.here(problem))?;
         let origin_names = header::has_origin_names(names);
         let mut fields: Vec<Field> = Vec::with_capacity(names.len());
+        let mut first_with: HashMap<String, usize> = HashMap::new();
         for (i, name) in names.iter().enumerate() {
             let field = header::field(name, origin_names).map_err(|problem| self.at(i, name, problem))?;
-            if let Some(first) = fields.iter().position(|other| other.name == field.name) {
+            if let Some(first) = first_with.insert(field.name.clone(), i) {
                 let problem = CsvProblem::Duplicate { first: first + 1, name: field.name };
                 return Err(self.at(i, name, problem));
             }

@@ -25,10 +25,13 @@ impl Display for Description {
         self.show_robot(f)?;
         self.show_channels(f)?;
         for finding in &self.findings {
-            paragraph(f, "note: ", finding, " ")?;
+            paragraph(f, "note: ", &plain(finding), " ")?;
         }
         match &self.damage {
-            Some(damage) => writeln!(f, "DAMAGED at {}: {}; what is told above stands before", damage.place, plain(&damage.what)),
+            Some(damage) => {
+                let lead = format!("DAMAGED at {}: ", damage.place);
+                paragraph(f, &lead, &format!("{}; what is told above stands before", plain(&damage.what)), " ")
+            }
             None => Ok(()),
         }
     }
@@ -40,7 +43,7 @@ impl Description {
         let rows = self.streams.first().map_or(0, |stream| stream.count);
         if self.repeated_rows > 0 {
             let percent = Percent(super::share(self.repeated_rows, rows));
-            writeln!(f, "repeated: {} rows ({percent}) equal the row before in all but the time", self.repeated_rows)?;
+            writeln!(f, "repeated: {} rows ({percent}) differ from the row before in their time only", self.repeated_rows)?;
         }
         if !self.runlevels.is_empty() {
             let shares: Vec<String> = self

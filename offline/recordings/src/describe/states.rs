@@ -179,7 +179,7 @@ fn result(name: &str, source: &dyn Source, states: &States, truths: &[Truths; 2]
             });
         }
     }
-    let rule = format!("every motor of the arm slower than {MOTOR_STILL_RAD_S} rad/s");
+    let rule = format!("all motors below {MOTOR_STILL_RAD_S} rad/s");
     Description {
         file: name.to_owned(),
         format: source.format().to_owned(),

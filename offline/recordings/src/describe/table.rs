@@ -92,10 +92,13 @@ fn speeds(fields: &[(String, f64)], places: &Places<'_>) -> (Vec<(usize, f64)>, 
             let unit = if name.ends_with("_deg_s") { 1_f64.to_radians() } else { *si };
             still / unit
         };
-        let rule = format!("every {kind} slower than {turning} rad/s ({JOINT_STILL_M_S} m/s where it slides)");
+        let rule = match kind {
+            "mvel" => format!("all {kind} below {turning} rad/s"),
+            _ => format!("all {kind} below {turning} rad/s, {JOINT_STILL_M_S} m/s"),
+        };
         return (found.into_iter().map(|place| (place, threshold(place))).collect(), rule);
     }
-    (Vec::new(), "positions equal to those of the row before".to_owned())
+    (Vec::new(), "positions as in the row before".to_owned())
 }
 
 /// Everything that is collected from a table.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::read::{CellValues, Cells, Groups};
 use super::store::Store;
 use crate::stream::{Damage, StreamError};
-use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
+use crate::table::{Batch, ColumnCells, TableColumn, TableSource, rows_of_batch};
 
 /// Largest whole number up to which a double holds every whole number.
 const EXACT_MAX: u64 = 1 << 53;
@@ -64,7 +64,7 @@ impl TableSource for TableReader {
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, StreamError> {
         batch.clear();
-        let rows = self.groups.next(BATCH_ROWS);
+        let rows = self.groups.next(rows_of_batch(self.columns.len()));
         if rows == 0 {
             return Ok(false);
         }
