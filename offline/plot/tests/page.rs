@@ -368,13 +368,17 @@ fn the_recordings_at_hand_are_drawn() {
         ("dvrk-payload/mtm_joint_cable_test.csv", ["1 joint", "The rows are numbered", "Joint load"]),
         ("dvrk-friction/fourier_psm1_1.csv", ["3 joints", "Load against velocity", "200 Hz"]),
         ("dvrk-optical/traj3_first_two_thirds.csv", ["Other channels", "measured_q", "marker"]),
+        ("dvrk-rgbd/train_pick_place.csv", ["6 joints", "true \u{2212} commanded", "Error by posture"]),
+        ("tendon-catheter/catheter_a2_0.2Hz.csv", ["Other channels", "motor_current_raw", "tip_angle"]),
+        ("vision-rendered/easy/truth.csv", ["Tip", "green", "True positions only"]),
     ] {
         let path = data.join(file);
         if !path.exists() {
             println!("skipped: {} is absent", path.display());
             continue;
         }
-        let recording = recordings::csv::read(&path).unwrap_or_else(|error| panic!("{error}"));
+        let mut source = recordings::open::open_table(&path).unwrap_or_else(|error| panic!("{error}"));
+        let recording = recordings::table::collect(file, source.as_mut()).unwrap_or_else(|error| panic!("{error}"));
         let html = page_of(&recording);
         println!("{file}: {} bytes", html.len());
         for part in parts {

@@ -1,9 +1,9 @@
 //! How fast the text formats and Parquet are read and written, and how much memory that takes.
 //!
-//! `cargo run --release -p ravenpose-recordings --example text_speed -- [SECONDS] [FOLDER]` makes SECONDS (default 60) of
+//! `cargo run --release -p ravenpose-recordings --example text_speed -- [SECONDS] [FOLDER] [NAME]` makes SECONDS (default 60) of
 //! 1 kHz motion of both arms with the truth of one, writes it in every format, reads each back, and prints MB per second of
 //! processor time twice: of the file, and of the 980-byte messages that the states stand for. The last column is the peak
-//! resident memory so far.
+//! resident memory so far. With NAME only files whose name has it are made.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -71,6 +71,8 @@ fn main() -> Result<(), StreamError> {
     let mut arguments = std::env::args().skip(1);
     let seconds: u64 = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(60);
     let folder = arguments.next().map_or_else(std::env::temp_dir, PathBuf::from);
+    let name_part = arguments.next().unwrap_or_default();
+    let wanted = |name: &str| name.contains(&name_part);
     let count = seconds * 1000;
     let messages = count * MESSAGE_BYTES;
     println!("{count} states ({} MB of messages) in {}", messages / 1_000_000, folder.display());
@@ -97,7 +99,10 @@ fn main() -> Result<(), StreamError> {
         ("text_speed.parquet", StateFormat::Parquet),
         ("text_speed.txt", StateFormat::Columns235),
         ("text_speed.252.csv", StateFormat::Columns252),
-    ] {
+    ]
+    .into_iter()
+    .filter(|(name, _)| wanted(name))
+    {
         let path = folder.join(name);
         let start = Start::now();
         let mut sink = create_states(&path, format, &[])?;
@@ -111,7 +116,10 @@ fn main() -> Result<(), StreamError> {
         ("text_speed.csv", TableFormat::Csv),
         ("text_speed.csv.gz", TableFormat::Csv),
         ("text_speed_table.parquet", TableFormat::Parquet),
-    ] {
+    ]
+    .into_iter()
+    .filter(|(name, _)| wanted(name))
+    {
         let path = folder.join(name);
         let start = Start::now();
         let mut table = StateTable::new(states(&base)?, Options { arms: Some(Arms::Gold), ..Options::default() })?;

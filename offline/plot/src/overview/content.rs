@@ -225,12 +225,18 @@ fn motors<'a>(columns: &mut Columns<'a>) -> BTreeMap<u32, Channel<'a>> {
 }
 
 fn tip<'a>(columns: &mut Columns<'a>) -> Option<[Channel<'a>; 3]> {
-    let axes = ["x", "y", "z"].map(|axis| Channel {
-        label: format!("Tip {axis}"),
-        commanded: columns.take(&format!("{axis}_d"), None),
-        reported: columns.take(axis, None),
-        truth: columns.take(&format!("truth_{axis}"), None),
-        ..Channel::default()
+    // `truth.csv` of the vision calls the true position plainly x, y, z; it is the table of numbered frames with a quaternion.
+    let of_cameras = columns.has("frame") && columns.has("qw");
+    let axes = ["x", "y", "z"].map(|axis| {
+        let plain = columns.take(axis, None);
+        let (reported, seen) = if of_cameras { (None, plain) } else { (plain, None) };
+        Channel {
+            label: format!("Tip {axis}"),
+            commanded: columns.take(&format!("{axis}_d"), None),
+            reported,
+            truth: columns.take(&format!("truth_{axis}"), None).or(seen),
+            ..Channel::default()
+        }
     });
     axes.iter().any(|axis| !axis.is_empty()).then_some(axes)
 }

@@ -99,6 +99,9 @@ pub(super) fn notices(content: &Content<'_>, errors: &Errors) -> Vec<String> {
         notices
             .push("No reported position beside the true one for some channels: their error is true \u{2212} commanded.".to_owned());
     }
+    if has_truth && kinds.is_empty() {
+        notices.push("True positions only: nothing that was commanded or reported to compare them with.".to_owned());
+    }
     if has_truth && errors.tip.as_ref().is_some_and(|tip| tip[0].kind == Kind::Tracking) {
         notices.push("The tip has no true position: its error is the tracking error, commanded \u{2212} reported.".to_owned());
     }
