@@ -10,5 +10,6 @@ pub mod robot;
 pub mod run;
 pub mod hypothesis;
 pub mod noise;
+pub mod refine;
 pub mod score;
 pub mod search;

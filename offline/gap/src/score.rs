@@ -192,6 +192,11 @@ impl<'a> Scorer<'a> {
         Fit { coefficients: coefficients.as_slice().to_vec(), covariance, held_out, within, without }
     }
 
+    /// Negative log likelihood of a fit on all rows, nats, up to a constant.
+    pub fn misfit(&self, fit: &Fit) -> f64 {
+        fit.within.iter().enumerate().map(|(c, sum)| 0.5 * self.rows(c) / self.correlation[c] * sum.max(1e-300).ln()).sum()
+    }
+
     fn rows(&self, cell: usize) -> f64 {
         self.whitened[cell].len() as f64
     }
@@ -219,7 +224,7 @@ impl<'a> Scorer<'a> {
 /// Are the coefficients of a candidate, the last ones of a fit, what they may be?
 pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
     let own = &fit.coefficients[fit.coefficients.len() - candidate.columns.len()..];
-    own.iter().zip(&candidate.bounds).all(|(x, bound)| match bound {
+    own.iter().zip(&candidate.family.bounds).all(|(x, bound)| match bound {
         Bound::Free => true,
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),

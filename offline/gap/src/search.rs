@@ -1,8 +1,11 @@
-//! Which candidates explain the residuals: forward, swap, drop (gap-design.md, section 7).
+//! Which candidates explain the residuals: forward, then swap and drop (gap-design.md, section 7).
 
-use crate::hypothesis::{Candidate, Dictionary, library};
+use std::sync::Arc;
+
+use crate::hypothesis::{Candidate, Dictionary, Family, library};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
+use crate::refine::{refined, starts};
 use crate::score::{Fit, Gain, Grams, Scorer, within_bounds};
 
 /// What decides.
@@ -18,7 +21,7 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { nats: 12.0, share: 0.1, effects: 4 }
+        Self { nats: 12.0, share: 0.15, effects: 4 }
     }
 }
 
@@ -29,6 +32,8 @@ pub struct Scored {
     pub candidate: Candidate,
     /// Over the set without it.
     pub gain: Gain,
+    /// Gain less what is paid for being searched or less likely, nats.
+    pub score: f64,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
 }
@@ -38,23 +43,28 @@ pub struct Scored {
 pub struct Effect {
     /// What was accepted.
     pub chosen: Scored,
-    /// The best of every other claim in its place, best first.
+    /// The best of every other claim in its place, beside the other effects, best first.
     pub rivals: Vec<Scored>,
+    /// Largest share of a cell's squared error that it removes beside the others.
+    pub share: f64,
 }
 
 /// The search's answer.
-#[derive(Debug, Clone)]
-pub struct Answer {
+pub struct Answer<'a> {
     /// In the order of acceptance.
     pub effects: Vec<Effect>,
+    /// Columns of all effects, in order.
+    pub grams: Grams,
     /// Fit of all of them together.
     pub fit: Fit,
     /// Fit of none.
     pub none: Fit,
     /// The best that was not accepted.
     pub next: Option<Scored>,
-    /// Noise of each cell, by the last model.
-    pub noise: Vec<Noise>,
+    /// Scores of this problem.
+    pub scorer: Scorer<'a>,
+    /// Everything that could have been said.
+    pub families: Vec<Arc<Family>>,
 }
 
 /// Measurement noise of every cell: white at the sensor, coloured by the window.
@@ -62,91 +72,178 @@ fn window_noise(problem: &Problem) -> Vec<Noise> {
     let motion = &problem.pairs[0].real;
     let step = motion.rows.get(1).map_or(1, |second| second - motion.rows[0]);
     let behind = motion.window.autocovariance(step, 3);
-    problem
-        .cells
-        .iter()
-        .map(|cell| {
-            if cell.channel == Channel::EndEffector { Noise::default() } else { Noise::from_autocovariance(&behind, cell.rows.len()) }
-        })
-        .collect()
+    let of = |tip: bool, rows: usize| if tip { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
+    problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()
+}
+
+/// A search under way.
+struct Search<'p, 'd> {
+    problem: &'p Problem<'p>,
+    dictionary: &'d Dictionary<'p>,
+    scorer: Scorer<'p>,
+    candidates: Vec<Candidate>,
+    thresholds: Thresholds,
 }
 
 /// Searches.
-pub fn search(problem: &Problem, thresholds: &Thresholds, trace: &mut dyn FnMut(String)) -> Answer {
-    let dictionary = Dictionary::new(problem);
-    let candidates = library(&dictionary);
-    let noise = window_noise(problem);
-    let mut scorer = Scorer::new(problem, noise.clone());
-    let empty = scorer.empty();
-    let none = scorer.fit(&empty);
-    let mut chosen: Vec<Scored> = Vec::new();
-    let mut rivals: Vec<Vec<Scored>> = Vec::new();
-    let mut grams = empty.clone();
-    let mut fit = none.clone();
+pub fn search<'p>(
+    problem: &'p Problem<'p>,
+    dictionary: &Dictionary<'p>,
+    thresholds: &Thresholds,
+    trace: &mut dyn FnMut(String),
+) -> Answer<'p> {
+    let families = library(dictionary);
+    let candidates: Vec<Candidate> = starts(dictionary, &families);
+    let mut search = Search { problem, dictionary, scorer: Scorer::new(problem, window_noise(problem)), candidates, thresholds: *thresholds };
+    let none = search.scorer.fit(&search.scorer.empty());
+    let mut chosen: Vec<Candidate> = Vec::new();
     let mut next = None;
     while chosen.len() < thresholds.effects {
-        scorer.temper(&grams, &fit);
-        let ranked = rank(problem, &scorer, &candidates, &grams, &fit);
-        let Some(best) = ranked.first().cloned() else { break };
-        for scored in ranked.iter().take(8) {
-            trace(describe(scored));
-        }
-        // Correlation that the model leaves makes fewer rows count.
-        let better = scorer.extended(&grams, &best.candidate.columns);
-        let with = scorer.fit(&better);
-        scorer.temper(&better, &with);
-        let best = Scored { gain: scorer.gain(&fit, &with), ..best };
-        trace(describe(&best));
-        let share = removed_share(&scorer, &grams, &fit, &best.candidate);
-        trace(format!("  best removes {:.1} % of its cell", 100.0 * share));
-        let needed = if chosen.is_empty() { 0.0 } else { thresholds.share };
-        if best.gain.nats < thresholds.nats || best.gain.nats < 2.0 * best.gain.error || share < needed {
+        let base = search.grams(&chosen, None);
+        let ranked = search.rank(&base);
+        ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
+        let Some(best) = ranked.into_iter().next() else { break };
+        let (best, share) = search.judged(&base, best);
+        trace(format!("  best: {} removes {:.1} % of its cell", describe(&best), 100.0 * share));
+        if !search.accepts(&best, share, chosen.len()) {
             next = Some(best);
             break;
         }
-        (grams, fit) = (better, with);
-        rivals.push(ranked.into_iter().skip(1).filter(|r| !r.candidate.same_claim(&best.candidate)).collect());
-        chosen.push(best);
+        chosen.push(best.candidate);
     }
-    let effects = chosen.into_iter().zip(rivals).map(|(chosen, rivals)| Effect { chosen, rivals }).collect();
-    Answer { effects, fit, none, next, noise }
+    let effects = search.settle(&mut chosen, trace);
+    let grams = search.grams(&chosen, None);
+    let fit = search.scorer.fit(&grams);
+    search.scorer.temper(&grams, &fit);
+    Answer { effects, grams, fit, none, next, scorer: search.scorer, families }
 }
 
-/// The best form of every claim, best claim first.
-fn rank(problem: &Problem, scorer: &Scorer, candidates: &[Candidate], grams: &Grams, base: &Fit) -> Vec<Scored> {
-    let score = |candidate: &Candidate| -> Option<Scored> {
-        let fit = scorer.fit(&scorer.extended(grams, &candidate.columns));
-        let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
-        within_bounds(candidate, &fit).then(|| Scored { candidate: candidate.clone(), gain: scorer.gain(base, &fit), coefficients: own })
-    };
-    let mut all = parallel(candidates, &score);
-    all.sort_by(|a, b| b.gain.nats.total_cmp(&a.gain.nats));
-    // Effects that begin on the way: the best claims again, with an onset.
-    let begun: Vec<Candidate> = distinct(&all)
-        .into_iter()
-        .take(12)
-        .filter(|s| s.gain.nats > 3.0)
-        .flat_map(|s| {
-            let shortest = problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
-            (1..20).map(move |k| (s.clone(), shortest * f64::from(k) / 20.0))
+impl Search<'_, '_> {
+    fn grams(&self, chosen: &[Candidate], without: Option<usize>) -> Grams {
+        chosen.iter().enumerate().filter(|(k, _)| Some(*k) != without).fold(self.scorer.empty(), |grams, (_, candidate)| {
+            self.scorer.extended(&grams, &candidate.columns)
         })
-        .map(|(s, onset)| {
-            let mut candidate = s.candidate.clone();
-            candidate.onset_s = Some(onset);
-            for column in &mut candidate.columns {
-                *column = column.begun_at(problem, onset);
+    }
+
+    /// Gain with the correlation that the model itself leaves, and the share that it removes.
+    fn judged(&mut self, base: &Grams, scored: Scored) -> (Scored, f64) {
+        let before = self.scorer.fit(base);
+        let grams = self.scorer.extended(base, &scored.candidate.columns);
+        let after = self.scorer.fit(&grams);
+        self.scorer.temper(&grams, &after);
+        let gain = self.scorer.gain(&before, &after);
+        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
+        let share = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).fold(0.0, f64::max);
+        (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share)
+    }
+
+    fn accepts(&self, best: &Scored, share: f64, beside: usize) -> bool {
+        let needed = if beside == 0 { 0.0 } else { self.thresholds.share };
+        best.score >= self.thresholds.nats && best.gain.nats >= 2.0 * best.gain.error && share >= needed
+    }
+
+    /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
+    fn settle(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let mut sweep = 0;
+        'again: loop {
+            sweep += 1;
+            effects.clear();
+            for k in 0..chosen.len() {
+                let base = self.grams(chosen, Some(k));
+                // Claims that stand beside are not also rivals.
+                let others: Vec<Candidate> = chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+                let mut ranked = self.rank(&base);
+                ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
+                let Some(best) = ranked.first().cloned() else { continue };
+                let swapped = !best.candidate.same_claim(&chosen[k]);
+                let (judged, share) = self.judged(&base, best);
+                if !self.accepts(&judged, share, others.len()) {
+                    trace(format!("  dropped {}", describe(&judged)));
+                    let _ = chosen.remove(k);
+                    continue 'again;
+                }
+                if swapped {
+                    trace(format!("  swapped for {}", describe(&judged)));
+                }
+                chosen[k] = judged.candidate.clone();
+                if swapped && sweep < 4 {
+                    continue 'again;
+                }
+                let scale = judged.gain.nats / ranked[0].gain.nats.max(1e-9);
+                let rivals = ranked
+                    .into_iter()
+                    .skip(1)
+                    .map(|mut r| {
+                        // On the scale of the judged gain.
+                        r.gain.nats *= scale;
+                        r.score = r.gain.nats - price(&r.candidate);
+                        r
+                    })
+                    .collect();
+                effects.push(Effect { chosen: judged, rivals, share });
             }
-            candidate
-        })
-        .collect();
-    let begun = parallel(&begun, &score);
-    // An onset has to pay for being searched.
-    all.extend(begun.into_iter().map(|mut s| {
-        s.gain.nats -= 6.0;
-        s
-    }));
-    all.sort_by(|a, b| b.gain.nats.total_cmp(&a.gain.nats));
-    distinct(&all)
+            return effects;
+        }
+    }
+
+    /// The best form of every claim, best claim first.
+    fn rank(&mut self, grams: &Grams) -> Vec<Scored> {
+        let base = self.scorer.fit(grams);
+        self.scorer.temper(grams, &base);
+        let score = |candidate: &Candidate| self.score(grams, &base, candidate);
+        let mut all = parallel(&self.candidates, &score);
+        sort(&mut all);
+        // Effects that begin on the way: the best claims again, with an onset.
+        let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
+        let begun: Vec<Candidate> = distinct(&all)
+            .into_iter()
+            .take(12)
+            .filter(|s| s.gain.nats > 3.0)
+            .flat_map(|s| (1..20).map(move |k| (s.clone(), shortest * f64::from(k) / 20.0)))
+            .map(|(s, onset)| {
+                let mut begun = s.candidate;
+                begun.onset_s = Some(onset);
+                begun.columns.iter_mut().for_each(|column| *column = column.begun_at(self.problem, onset));
+                begun
+            })
+            .filter(Candidate::shows)
+            .collect();
+        all.extend(parallel(&begun, &score));
+        sort(&mut all);
+        let mut claims = distinct(&all);
+        // Between the grid's points, for those that may win.
+        let best = claims.first().map_or(0.0, |s| s.score);
+        for scored in claims.iter_mut().take(5).filter(|s| s.score > 3.0 && s.score > 0.2 * best) {
+            let candidate = refined(self.dictionary, &scored.candidate, &|candidate| {
+                let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
+                if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }
+            });
+            if let Some(better) = self.score(grams, &base, &candidate)
+                && better.score > scored.score
+            {
+                *scored = better;
+            }
+        }
+        sort(&mut claims);
+        claims
+    }
+
+    fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
+        let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
+        let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+        let gain = self.scorer.gain(base, &fit);
+        within_bounds(candidate, &fit).then(|| Scored { candidate: candidate.clone(), gain, score: gain.nats - price(candidate), coefficients })
+    }
+}
+
+/// What a candidate pays for being one of many or less likely, nats.
+fn price(candidate: &Candidate) -> f64 {
+    candidate.family.penalty_nats + if candidate.onset_s.is_some() { 6.0 } else { 0.0 }
+}
+
+fn sort(all: &mut [Scored]) {
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
 }
 
 /// The first of every claim.
@@ -161,8 +258,7 @@ fn distinct(sorted: &[Scored]) -> Vec<Scored> {
 }
 
 fn parallel(candidates: &[Candidate], score: &(dyn Fn(&Candidate) -> Option<Scored> + Sync)) -> Vec<Scored> {
-    let half = candidates.len() / 2;
-    let (left, right) = candidates.split_at(half);
+    let (left, right) = candidates.split_at(candidates.len() / 2);
     std::thread::scope(|scope| {
         let other = scope.spawn(|| right.iter().filter_map(score).collect::<Vec<_>>());
         let mut all: Vec<Scored> = left.iter().filter_map(score).collect();
@@ -171,23 +267,18 @@ fn parallel(candidates: &[Candidate], score: &(dyn Fn(&Candidate) -> Option<Scor
     })
 }
 
-/// Largest share of a cell's remaining squared error that a candidate removes.
-fn removed_share(scorer: &Scorer, grams: &Grams, base: &Fit, candidate: &Candidate) -> f64 {
-    let fit = scorer.fit(&scorer.extended(grams, &candidate.columns));
-    let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
-    (0..base.held_out.len()).map(|c| 1.0 - sum(&fit, c) / sum(base, c).max(1e-300)).fold(0.0, f64::max)
-}
-
 /// One line of a trace.
 pub fn describe(scored: &Scored) -> String {
     let c = &scored.candidate;
+    let family = &c.family;
     format!(
-        "  {:9.1} ± {:5.1}  {} {:?} ({}) {:?} onset {:?} θ {:.4?}",
-        scored.gain.nats,
+        "  {:9.1} ± {:5.1}  {} {:?} ({}) {:?} {:.5?} onset {:?} θ {:.5?}",
+        scored.score,
         scored.gain.error,
-        c.physics,
-        c.joints.iter().map(|j| j + 1).collect::<Vec<_>>(),
-        c.form,
+        family.physics,
+        family.joints.iter().map(|j| j + 1).collect::<Vec<_>>(),
+        family.form,
+        family.shape,
         c.shape,
         c.onset_s,
         scored.coefficients

@@ -97,6 +97,13 @@ impl<'a> Dictionary<'a> {
         out
     }
 
+    /// Distance between the ends of a joint's motion, rad or m.
+    pub fn travel(&self, j: usize) -> f64 {
+        let q = self.at_grid(|r, i, _| self.problem.pairs[r].real.position[j][i]);
+        let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        (high - low).max(1e-9)
+    }
+
     /// Load on the cable of a joint at the grid.
     pub fn load(&self, joint: usize) -> Vec<f64> {
         self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
@@ -193,7 +200,17 @@ impl<'a> Dictionary<'a> {
     }
 }
 
+/// Two series, row by row.
+pub(super) fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+/// A series with the other sign.
+pub(super) fn minus(a: &[f64]) -> Vec<f64> {
+    a.iter().map(|x| -x).collect()
+}
+
 /// Root of the mean square of a series.
-pub fn size(series: &[f64]) -> f64 {
+pub(super) fn size(series: &[f64]) -> f64 {
     crate::nominal::rms(series.iter().copied())
 }

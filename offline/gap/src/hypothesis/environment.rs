@@ -1,10 +1,12 @@
 //! Contact: a wall, or a steady force.
 
+use std::sync::Arc;
+
 use arm::serial::Workspace;
 use nalgebra::Vector3;
 
 use super::dictionary::Dictionary;
-use super::{Bound, Candidate};
+use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
 /// Places of a wall, as shares of the travel along its normal.
@@ -12,55 +14,77 @@ const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
 /// Exponents of its force.
 const EXPONENTS: [f64; 2] = [1.0, 1.5];
 
-pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
+/// Tip and Jacobian (3×N row-major) at the grid rows.
+struct Tips {
+    positions: Vec<Vector3<f64>>,
+    jacobians: Vec<Vec<f64>>,
+}
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    const TORQUE: Channel = Channel::JointTorque;
+    if dictionary.problem.cell(TORQUE, 0).is_none() {
+        return;
+    }
+    let tips = Arc::new(tips(dictionary));
+    let own = tips.clone();
+    all.push(
+        Family::fixed("external_contact", &[], "steady force", TORQUE, &[Bound::Free; 3], move |d| {
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| effort(d, &own, |_| axis)).to_vec()
+        })
+        .penalised(2.0),
+    );
+    for (k, normal) in normals().into_iter().enumerate() {
+        let along = tips.positions.iter().map(|tip| tip.dot(&normal));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let walls = WALLS.map(|share| low + share * (high - low));
+        let tips = tips.clone();
+        all.push(
+            Family::shaped(
+                "external_contact",
+                &[],
+                "wall",
+                TORQUE,
+                &[Bound::Positive],
+                &[("x_0", true), ("p", false), ("normal", false)],
+                product(&[&walls, &EXPONENTS, &[k as f64]]),
+                move |d, s| {
+                    // The wall pushes back, against its normal.
+                    vec![effort(d, &tips, |row| -normal * (tips.positions[row].dot(&normal) - s[0]).max(0.0).powf(s[1]))]
+                },
+            )
+            .penalised(4.0),
+        );
+    }
+}
+
+fn tips(dictionary: &Dictionary) -> Tips {
     let problem = dictionary.problem;
     let n = dictionary.joints();
     let mut ws = Workspace::new(&problem.robot.arm);
     let mut jacobian = vec![0.0; 6 * n];
-    let mut tips = Vec::with_capacity(dictionary.grid.len());
-    let mut pulls = Vec::with_capacity(dictionary.grid.len());
+    let (mut positions, mut jacobians) = (Vec::new(), Vec::new());
     for &(r, i, _) in &dictionary.grid {
         let q = problem.pairs[r].real.link(i).position;
-        tips.push(problem.robot.arm.tip(&mut ws, &q).translation.vector);
+        positions.push(problem.robot.arm.tip(&mut ws, &q).translation.vector);
         problem.robot.arm.jacobian(&mut ws, &q, &Vector3::zeros(), &mut jacobian);
-        pulls.push(jacobian[..3 * n].to_vec());
+        jacobians.push(jacobian[..3 * n].to_vec());
     }
-    // A force on the tip asks -Jᵀ f of the joints.
-    let effort = |force: &dyn Fn(usize) -> Vector3<f64>| {
-        let torques: Vec<Option<Vec<f64>>> = (0..n)
-            .map(|j| {
-                Some((0..tips.len()).map(|row| -(0..3).map(|a| pulls[row][a * n + j] * force(row)[a]).sum::<f64>()).collect())
-            })
-            .collect();
-        dictionary.effort(&torques, true)
+    Tips { positions, jacobians }
+}
+
+/// A force on the tip asks `-Jᵀ f` of the joints.
+fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3<f64>) -> Column {
+    let n = dictionary.joints();
+    let forces: Vec<Vector3<f64>> = (0..tips.positions.len()).map(force).collect();
+    let torque = |j: usize| {
+        forces.iter().zip(&tips.jacobians).map(|(f, jacobian)| -(0..3).map(|a| jacobian[a * n + j] * f[a]).sum::<f64>()).collect()
     };
-    let mut steady = Candidate::new("external_contact", &[], "steady force", Channel::JointTorque);
-    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-        steady = steady.with(effort(&|_| axis), Bound::Free);
-    }
-    all.push(steady);
-    for (k, normal) in normals().into_iter().enumerate() {
-        let along: Vec<f64> = tips.iter().map(|tip| tip.dot(&normal)).collect();
-        let (low, high) = along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        for share in WALLS {
-            let wall = low + share * (high - low);
-            for exponent in EXPONENTS {
-                // The wall pushes back, against its normal.
-                let column = effort(&|row| -normal * (along[row] - wall).max(0.0).powf(exponent));
-                all.push(
-                    Candidate::new("external_contact", &[], "wall", Channel::JointTorque)
-                        .shaped("normal", k as f64)
-                        .shaped("x_0", wall)
-                        .shaped("p", exponent)
-                        .with(column, Bound::Positive),
-                );
-            }
-        }
-    }
+    let torques: Vec<Option<Vec<f64>>> = (0..n).map(|j| Some(torque(j))).collect();
+    dictionary.effort(&torques, true)
 }
 
 /// Directions of walls: the six axes and the twelve between two of them.
-pub(super) fn normals() -> Vec<Vector3<f64>> {
+pub(crate) fn normals() -> Vec<Vector3<f64>> {
     let mut all = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {

@@ -1,73 +1,71 @@
 //! Friction on the motor's or the link's side, and friction that fades with heat.
 
-use super::dictionary::{Dictionary, size};
-use super::{Bound, Candidate};
+use super::dictionary::{Dictionary, size, times};
+use super::{Bound, Family, product};
 use crate::problem::Channel;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel; 0: with the sign of the velocity alone.
 /// Below break-away a bristle keeps its force, which a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 4] = [0.0, 0.0005, 0.003, 0.015];
+/// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
+const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
 const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
 /// Exponents of the Stribeck curve.
 const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
 /// Time constants of heating, s.
-const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
-pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    if dictionary.problem.cell(Channel::JointTorque, 0).is_none() {
+        return;
+    }
     for j in 0..dictionary.joints() {
-        push_joint(dictionary, j, all);
+        for (form, at_link) in [("motor side", false), ("link side", true)] {
+            // On the link's side it loads the cable too; seldom told apart, and mostly small there.
+            let penalty = if at_link { 1.0 } else { 0.0 };
+            let mut families = Vec::new();
+            push_side(dictionary, j, form, at_link, &mut families);
+            all.extend(families.into_iter().map(|f| { let own = f.penalty_nats; f.penalised(own + penalty) }));
+        }
     }
 }
 
-fn push_joint(dictionary: &Dictionary, j: usize, all: &mut Vec<Candidate>) {
-    let signs: Vec<(f64, Vec<f64>)> = presliding(dictionary, j).into_iter().map(|d| (d, turning(dictionary, j, d))).collect();
-    let velocity = dictionary.at_grid(|r, i, _| dictionary.problem.pairs[r].real.velocity[j][i]);
-    let speed = size(&velocity).max(1e-9);
-    let load = dictionary.load(j);
-    for (form, at_link) in [("motor side", false), ("link side", true)] {
-        for (travel, sign) in &signs {
-            let named = |physics| Candidate::new(physics, &[j], form, Channel::JointTorque).shaped("presliding", *travel);
-            all.push(named("coulomb_friction").with(dictionary.effort_of(j, sign.clone(), at_link), Bound::Positive));
-            let by_load: Vec<f64> = sign.iter().zip(&load).map(|(s, l)| s * l.abs()).collect();
-            all.push(named("load_dependent_friction").with(dictionary.effort_of(j, by_load.clone(), at_link), Bound::Positive));
-            all.push(
-                named("load_dependent_friction")
-                    .with(dictionary.effort_of(j, by_load, at_link), Bound::Positive)
-                    .with(dictionary.effort_of(j, sign.clone(), at_link), Bound::Positive),
-            );
-            if !at_link {
-                for heating in HEATING_S {
-                    let faded = heated(dictionary, j, heating, sign);
-                    all.push(named("thermal_drift").shaped("T", heating).with(dictionary.effort_of(j, faded, at_link), Bound::Free));
-                }
-            }
-        }
-        all.push(
-            Candidate::new("viscous_friction", &[j], form, Channel::JointTorque)
-                .with(dictionary.effort_of(j, velocity.clone(), at_link), Bound::Positive),
-        );
-        for share in STRIBECK_SPEED {
-            for exponent in STRIBECK_EXPONENT {
-                let slow = share * speed;
-                let (sign, extra) = stribeck(dictionary, j, slow, exponent);
-                all.push(
-                    Candidate::new("stribeck_friction", &[j], form, Channel::JointTorque)
-                        .shaped("v_s", slow)
-                        .shaped("a", exponent)
-                        .with(dictionary.effort_of(j, sign, at_link), Bound::Positive)
-                        .with(dictionary.effort_of(j, extra, at_link), Bound::Positive),
-                );
-            }
-        }
+fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: bool, all: &mut Vec<Family>) {
+    const TORQUE: Channel = Channel::JointTorque;
+    let travels = presliding(dictionary, j);
+    let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.velocity[j][i]);
+    let speed = size(&velocity(dictionary)).max(1e-9);
+    let by_load = move |d: &Dictionary, travel: f64| {
+        let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
+        d.effort_of(j, times(&turning(d, j, travel), &load), at_link)
+    };
+    let slowest = SIGN_SPEED.map(|share| share * speed);
+    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("v_eps", true)], product(&[&slowest]),
+        move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)]));
+    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", true)], product(&[&travels[1..]]),
+        move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)]));
+    all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", false)], product(&[&travels]),
+        move |d, s| vec![by_load(d, s[0])]).penalised(1.0));
+    all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("presliding", false)], product(&[&travels]),
+        move |d, s| vec![by_load(d, s[0]), d.effort_of(j, turning(d, j, s[0]), at_link)]).penalised(3.0));
+    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive],
+        move |d| vec![d.effort_of(j, velocity(d), at_link)]));
+    let slow = STRIBECK_SPEED.map(|share| share * speed);
+    all.push(Family::shaped("stribeck_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("v_s", true), ("a", true)],
+        product(&[&slow, &STRIBECK_EXPONENT]),
+        move |d, s| { let (sign, extra) = stribeck(d, j, s[0], s[1]); vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)] }).penalised(3.0));
+    if !at_link {
+        all.push(Family::shaped("thermal_drift", &[j], "friction fades", TORQUE, &[Bound::Free], &[("T", true), ("presliding", false)],
+            product(&[&HEATING_S, &travels]),
+            move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &turning(d, j, s[1])), false)]).penalised(2.0));
     }
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.
 fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
-    let q = dictionary.at_grid(|r, i, _| dictionary.problem.pairs[r].real.position[j][i]);
-    let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-    PRESLIDING.iter().map(|share| share * (high - low)).collect()
+    let travel = dictionary.travel(j);
+    PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
 /// Sign of the motion, turning round over a presliding travel (Dahl), smoothed.
@@ -90,6 +88,11 @@ pub(super) fn turning(dictionary: &Dictionary, j: usize, travel: f64) -> Vec<f64
             })
             .collect()
     })
+}
+
+/// Sign of the velocity, turning over `eps`, smoothed.
+fn sign_below(dictionary: &Dictionary, j: usize, eps: f64) -> Vec<f64> {
+    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect())
 }
 
 /// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`.
@@ -131,8 +134,4 @@ pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64
             1.0 - (-h / heating_s).exp()
         })
         .collect()
-}
-
-fn heated(dictionary: &Dictionary, j: usize, heating_s: f64, sign: &[f64]) -> Vec<f64> {
-    heat(dictionary, j, heating_s).iter().zip(sign).map(|(h, s)| h * s).collect()
 }

@@ -1,62 +1,78 @@
 //! Weights, links and the direction of gravity.
 
+use std::sync::Arc;
+
 use arm::serial::{LinkInertia, PARAMETERS, Workspace};
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::dictionary::Dictionary;
-use super::{Bound, Candidate};
+use super::{Bound, Family};
 use crate::nominal::Evaluator;
 use crate::problem::Channel;
 
-pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    if dictionary.problem.cell(TORQUE, 0).is_none() {
+        return;
+    }
     let robot = dictionary.problem.robot;
     let n = robot.joint_count();
-    let regressor = regressor(dictionary);
     let last = n - 1;
+    let y = Arc::new(regressor(dictionary));
     let tip = robot.arm.tool_pose().translation.vector;
-    let weight = |link: usize, point: Vector3<f64>| point_column(dictionary, &regressor, link, &point);
-    all.push(
-        Candidate::new("payload", &[], "at the tip", Channel::JointTorque)
-            .shaped("link", last as f64)
-            .shaped("c_x", tip.x)
-            .shaped("c_y", tip.y)
-            .shaped("c_z", tip.z)
-            .with(weight(last, tip), Bound::Positive),
-    );
-    for site in &robot.payload_sites {
-        let [x, y, z] = site.position_m;
-        all.push(
-            Candidate::new("payload", &[], "at a site", Channel::JointTorque)
-                .shaped("link", site.link as f64)
-                .shaped("c_x", x)
-                .shaped("c_y", y)
-                .shaped("c_z", z)
-                .with(weight(site.link, Vector3::new(x, y, z)), Bound::Positive),
-        );
+    let mut places = vec![("at the tip", last, tip)];
+    places.extend(robot.payload_sites.iter().map(|site| ("at a site", site.link, Vector3::from(site.position_m))));
+    for (form, link, point) in places {
+        let y = y.clone();
+        all.push(Family::shaped(
+            "payload",
+            &[],
+            form,
+            TORQUE,
+            &[Bound::Positive],
+            &[("link", false), ("c_x", false), ("c_y", false), ("c_z", false)],
+            vec![vec![link as f64, point.x, point.y, point.z]],
+            move |d, s| vec![point_column(d, &y, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
+        ));
     }
     // Mass and first moment free; inertia about the origin of a small body follows from them only roughly, and weighs little.
-    let mut free = Candidate::new("payload", &[], "anywhere on the last link", Channel::JointTorque).shaped("link", last as f64);
-    for k in 0..4 {
-        free = free.with(parameter_column(dictionary, &regressor, last, k), if k == 0 { Bound::Positive } else { Bound::Free });
-    }
-    all.push(free);
+    let own = y.clone();
+    all.push(
+        Family::shaped(
+            "payload",
+            &[],
+            "anywhere on the last link",
+            TORQUE,
+            &[Bound::Positive, Bound::Free, Bound::Free, Bound::Free],
+            &[("link", false)],
+            vec![vec![last as f64]],
+            move |d, s| (0..4).map(|k| parameter_column(d, &own, s[0] as usize, k)).collect(),
+        )
+        .penalised(3.0),
+    );
     for link in 0..n {
-        let own = robot.arm.link_inertia(link).parameters();
-        if own.iter().any(|x| *x != 0.0) {
+        let parameters = robot.arm.link_inertia(link).parameters();
+        if parameters.iter().any(|x| *x != 0.0) {
+            let y = y.clone();
             all.push(
-                Candidate::new("link_inertia", &[link], "scaled", Channel::JointTorque)
-                    .shaped("mass", own[0])
-                    .with(weighted_column(dictionary, &regressor, link, &own), Bound::Between(-0.9, 10.0)),
+                Family::fixed("link_inertia", &[link], "scaled", TORQUE, &[Bound::Between(-0.95, 20.0)], move |d| {
+                    vec![weighted_column(d, &y, link, &parameters)]
+                })
+                .penalised(1.0),
             );
         }
-        let mut free = Candidate::new("link_inertia", &[link], "free", Channel::JointTorque);
-        for k in independent(dictionary, &regressor, link) {
-            free = free.shaped("parameter", k as f64).with(parameter_column(dictionary, &regressor, link, k), Bound::Free);
-        }
-        all.push(free);
+        let free = independent(dictionary, &y, link);
+        let y = y.clone();
+        all.push(
+            Family::fixed("link_inertia", &[link], "free", TORQUE, &vec![Bound::Free; free.len()], move |d| {
+                free.iter().map(|k| parameter_column(d, &y, link, *k)).collect()
+            })
+            .penalised(4.0),
+        );
     }
-    push_gravity(dictionary, all);
+    push_gravity(all);
 }
+
+const TORQUE: Channel = Channel::JointTorque;
 
 /// The arm's regressor at every grid row, N×10N row-major.
 fn regressor(dictionary: &Dictionary) -> Vec<Vec<f64>> {
@@ -129,11 +145,10 @@ fn independent(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize) -> 
 }
 
 /// Small turns of gravity about the base's x and y.
-fn push_gravity(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
+fn push_gravity(all: &mut Vec<Family>) {
     const TURN: f64 = 1e-4;
-    let problem = dictionary.problem;
-    let mut candidate = Candidate::new("gravity_direction", &[], "turned", Channel::JointTorque);
-    for axis in [Vector3::x(), Vector3::y()] {
+    let turned = |dictionary: &Dictionary, axis: Vector3<f64>| {
+        let problem = dictionary.problem;
         let mut robot = problem.robot.clone();
         robot.arm.set_gravity(Rotation3::from_scaled_axis(axis * TURN) * problem.robot.arm.gravity_vector());
         let mut turned = Evaluator::new(&robot, problem.nominal);
@@ -146,7 +161,10 @@ fn push_gravity(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
             })
             .collect();
         let series: Vec<Option<Vec<f64>>> = (0..dictionary.joints()).map(|j| Some(torques.iter().map(|t| t[j]).collect())).collect();
-        candidate = candidate.with(dictionary.effort(&series, true), Bound::Between(-0.6, 0.6));
-    }
-    all.push(candidate);
+        dictionary.effort(&series, true)
+    };
+    let bound = Bound::Between(-0.7, 0.7);
+    all.push(Family::fixed("gravity_direction", &[], "turned", TORQUE, &[bound, bound], move |d| {
+        vec![turned(d, Vector3::x()), turned(d, Vector3::y())]
+    }));
 }

@@ -4,57 +4,67 @@ use arm::serial::{Body, SerialArm, Tool, Workspace};
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 
 use super::dictionary::Dictionary;
-use super::{Bound, Candidate, Column};
+use super::{Bound, Column, Family};
 use crate::problem::Channel;
 
-pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Candidate>) {
+const TIP: Channel = Channel::EndEffector;
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if dictionary.tip_rows.is_empty() {
         return;
     }
-    let problem = dictionary.problem;
-    let arm = &problem.robot.arm;
-    let here = tips(dictionary, arm);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let small = Bound::Between(-0.2, 0.2);
     for link in 0..dictionary.joints() {
-        const TURN: f64 = 1e-4;
-        let turned = with_placement(arm, link, |placement| placement * Rotation3::from_scaled_axis(Vector3::x() * TURN));
-        let before = with_placement(arm, link, |placement| Rotation3::from_scaled_axis(Vector3::x() * TURN) * placement);
-        for (form, arm) in [("twist before the joint", before), ("twist of the link's own frame", turned)] {
-            let column = derivative(dictionary, &here, &arm, TURN);
-            all.push(Candidate::new("link_geometry", &[link], form, Channel::EndEffector).with(column, Bound::Between(-0.2, 0.2)));
+        all.push(Family::fixed("link_geometry", &[link], "twist before the joint", TIP, &[small], move |d| {
+            const TURN: f64 = 1e-4;
+            let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
+            vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| turn * placement), TURN)]
+        }));
+        for (axis, form) in axes.into_iter().zip(["moved along x", "moved along y", "moved along z"]) {
+            all.push(
+                Family::fixed("link_geometry", &[link], form, TIP, &[small], move |d| {
+                    const STEP: f64 = 1e-5;
+                    let step = Translation3::from(axis * STEP);
+                    vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| step * placement), STEP)]
+                })
+                .penalised(2.0),
+            );
         }
-        for (k, axis) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
-            const STEP: f64 = 1e-5;
-            let moved = with_placement(arm, link, |placement| Translation3::from(axis * STEP) * placement);
-            let column = derivative(dictionary, &here, &moved, STEP);
-            let form = ["moved along x", "moved along y", "moved along z"][k];
-            all.push(Candidate::new("link_geometry", &[link], form, Channel::EndEffector).with(column, Bound::Between(-0.1, 0.1)));
-        }
     }
-    push_length(dictionary, &here, all);
-    let mut frame = Candidate::new("frame_misalignment", &[], "turned and moved", Channel::EndEffector);
-    let mut moved = Candidate::new("frame_misalignment", &[], "moved", Channel::EndEffector);
-    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-        frame = frame.with(dictionary.tip(|_, _, row| axis.cross(&here[row]).into()), Bound::Between(-0.6, 0.6));
-    }
-    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-        frame = frame.with(dictionary.tip(|_, _, _| axis.into()), Bound::Free);
-        moved = moved.with(dictionary.tip(|_, _, _| axis.into()), Bound::Free);
-    }
-    all.push(frame);
-    all.push(moved);
+    let last = dictionary.joints() - 1;
+    all.push(Family::fixed("link_geometry", &[last], "length", TIP, &[small], longer));
+    let turned = Bound::Between(-0.7, 0.7);
+    let moves = move |d: &Dictionary| axes.map(|axis| d.tip(|_, _, _| axis.into()));
+    all.push(
+        Family::fixed("frame_misalignment", &[], "turned and moved", TIP, &[turned, turned, turned, Bound::Free, Bound::Free, Bound::Free], move |d| {
+            let here = tips(d, &d.problem.robot.arm);
+            let mut columns = axes.map(|axis| d.tip(|_, _, row| axis.cross(&here[row]).into())).to_vec();
+            columns.extend(moves(d));
+            columns
+        })
+        .penalised(1.0),
+    );
+    all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[Bound::Free; 3], move |d| moves(d).to_vec()));
+    all.push(Family::fixed("frame_misalignment", &[], "turned", TIP, &[turned; 3], move |d| {
+        let here = tips(d, &d.problem.robot.arm);
+        axes.map(|axis| d.tip(|_, _, row| axis.cross(&here[row]).into())).to_vec()
+    }));
 }
 
 /// Length of the tool: along its offset from the last link.
-fn push_length(dictionary: &Dictionary, here: &[Vector3<f64>], all: &mut Vec<Candidate>) {
+fn longer(dictionary: &Dictionary) -> Vec<Column> {
     const STEP: f64 = 1e-5;
     let arm = &dictionary.problem.robot.arm;
+    let step = Translation3::from(tool_axis(arm) * STEP);
+    vec![derivative(dictionary, &rebuilt(arm, arm.bodies().to_vec(), step * arm.tool_pose()), STEP)]
+}
+
+/// Direction in which the tool is long, in the last link.
+pub(crate) fn tool_axis(arm: &SerialArm) -> Vector3<f64> {
     let pose = arm.tool_pose();
     let offset = pose.translation.vector;
-    let axis = if offset.norm() > 1e-6 { offset.normalize() } else { pose.rotation * Vector3::z() };
-    let longer = with_tool(arm, Translation3::from(axis * STEP) * pose);
-    let column = derivative(dictionary, here, &longer, STEP);
-    let last = dictionary.joints() - 1;
-    all.push(Candidate::new("link_geometry", &[last], "length", Channel::EndEffector).with(column, Bound::Between(-0.1, 0.1)));
+    if offset.norm() > 1e-6 { offset.normalize() } else { pose.rotation * Vector3::z() }
 }
 
 fn tips(dictionary: &Dictionary, arm: &SerialArm) -> Vec<Vector3<f64>> {
@@ -64,8 +74,8 @@ fn tips(dictionary: &Dictionary, arm: &SerialArm) -> Vec<Vector3<f64>> {
     dictionary.tip_rows.iter().map(|row| arm.tip(&mut ws, &at(row)).translation.vector).collect()
 }
 
-fn derivative(dictionary: &Dictionary, here: &[Vector3<f64>], arm: &SerialArm, step: f64) -> Column {
-    let there = tips(dictionary, arm);
+fn derivative(dictionary: &Dictionary, arm: &SerialArm, step: f64) -> Column {
+    let (here, there) = (tips(dictionary, &dictionary.problem.robot.arm), tips(dictionary, arm));
     dictionary.tip(|_, _, row| ((there[row] - here[row]) / step).into())
 }
 
@@ -73,10 +83,6 @@ fn with_placement(arm: &SerialArm, link: usize, change: impl Fn(IsometryMatrix3<
     let mut bodies: Vec<Body> = arm.bodies().to_vec();
     bodies[link].placement = change(bodies[link].placement);
     rebuilt(arm, bodies, arm.tool_pose())
-}
-
-fn with_tool(arm: &SerialArm, pose: IsometryMatrix3<f64>) -> SerialArm {
-    rebuilt(arm, arm.bodies().to_vec(), pose)
 }
 
 fn rebuilt(arm: &SerialArm, bodies: Vec<Body>, tool: IsometryMatrix3<f64>) -> SerialArm {

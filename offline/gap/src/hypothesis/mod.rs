@@ -9,6 +9,8 @@ mod kinematic;
 mod timing;
 mod transmission;
 
+use std::sync::Arc;
+
 pub use dictionary::{Column, Dictionary};
 
 use crate::problem::Channel;
@@ -24,61 +26,138 @@ pub enum Bound {
     Between(f64, f64),
 }
 
-/// A hypothesis with fixed shape: a physics bound to its place, linear in what is left to fit.
-#[derive(Debug, Clone)]
-pub struct Candidate {
+/// Columns for a shape.
+type Columns = dyn Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync;
+
+/// One form of a physics at its place: linear in its coefficients, for shapes that are searched.
+pub struct Family {
     /// Name in the vocabulary.
     pub physics: &'static str,
-    /// Joints it is tied to; empty: to none.
+    /// Joints (links) it is tied to; empty: to none.
     pub joints: Vec<usize>,
     /// Which form of it.
     pub form: &'static str,
     /// Channel where it shows most.
     pub channel: Channel,
-    /// Numbers that fix its shape, by name.
-    pub shape: Vec<(&'static str, f64)>,
-    /// One per coefficient.
-    pub columns: Vec<Column>,
+    /// Names of the numbers of its shape.
+    pub shape: Vec<&'static str>,
+    /// Shapes to begin with; one empty shape where there is nothing to search.
+    pub grid: Vec<Vec<f64>>,
+    /// Which numbers of the shape are refined between the grid's; the others are choices.
+    pub refined: Vec<bool>,
     /// One per coefficient.
     pub bounds: Vec<Bound>,
+    /// Rank among equals: smaller is simpler or likelier before any data.
+    pub penalty_nats: f64,
+    columns: Arc<Columns>,
+}
+
+impl std::fmt::Debug for Family {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?} ({})", self.physics, self.joints, self.form)
+    }
+}
+
+impl Family {
+    /// A form whose columns do not depend on a shape.
+    pub fn fixed(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        columns: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            physics,
+            joints: joints.to_vec(),
+            form,
+            channel,
+            shape: Vec::new(),
+            grid: vec![Vec::new()],
+            refined: Vec::new(),
+            bounds: bounds.to_vec(),
+            penalty_nats: 0.0,
+            columns: Arc::new(move |dictionary, _| columns(dictionary)),
+        }
+    }
+
+    /// A form whose columns have a shape: names with whether they are refined, and where to begin.
+    pub fn shaped(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        shape: &[(&'static str, bool)],
+        grid: Vec<Vec<f64>>,
+        columns: impl Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            physics,
+            joints: joints.to_vec(),
+            form,
+            channel,
+            shape: shape.iter().map(|s| s.0).collect(),
+            refined: shape.iter().map(|s| s.1).collect(),
+            grid,
+            bounds: bounds.to_vec(),
+            penalty_nats: 0.0,
+            columns: Arc::new(columns),
+        }
+    }
+
+    /// Less likely than its rivals by so much, before any data.
+    #[must_use]
+    pub fn penalised(mut self, nats: f64) -> Self {
+        self.penalty_nats = nats;
+        self
+    }
+}
+
+/// A family at one shape and onset, its columns made.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// What it says.
+    pub family: Arc<Family>,
+    /// Numbers that fix its shape, in the family's order.
+    pub shape: Vec<f64>,
     /// Seconds from the start of each run at which it begins; none: always there.
     pub onset_s: Option<f64>,
+    /// One per coefficient.
+    pub columns: Vec<Column>,
 }
 
 impl Candidate {
-    /// One that is always there.
-    pub fn new(physics: &'static str, joints: &[usize], form: &'static str, channel: Channel) -> Self {
-        Self { physics, joints: joints.to_vec(), form, channel, shape: Vec::new(), columns: Vec::new(), bounds: Vec::new(), onset_s: None }
-    }
-
-    /// With one more coefficient.
-    #[must_use]
-    pub fn with(mut self, column: Column, bound: Bound) -> Self {
-        self.columns.push(column);
-        self.bounds.push(bound);
-        self
-    }
-
-    /// With a number of its shape.
-    #[must_use]
-    pub fn shaped(mut self, name: &'static str, value: f64) -> Self {
-        self.shape.push((name, value));
-        self
+    /// Makes the columns.
+    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], onset_s: Option<f64>) -> Self {
+        let mut columns = (family.columns)(dictionary, shape);
+        if let Some(onset) = onset_s {
+            for column in &mut columns {
+                *column = column.begun_at(dictionary.problem, onset);
+            }
+        }
+        Self { family: family.clone(), shape: shape.to_vec(), onset_s, columns }
     }
 
     /// A number of its shape.
     pub fn shape_of(&self, name: &str) -> Option<f64> {
-        self.shape.iter().find(|(n, _)| *n == name).map(|(_, v)| *v)
+        self.family.shape.iter().position(|n| *n == name).map(|k| self.shape[k])
+    }
+
+    /// Does every coefficient reach some residual?
+    pub fn shows(&self) -> bool {
+        !self.columns.is_empty() && self.columns.iter().all(|column| !column.is_empty())
     }
 
     /// Do the two say the same physics at the same place?
     pub fn same_claim(&self, other: &Self) -> bool {
-        self.physics == other.physics && self.joints == other.joints
+        self.family.physics == other.family.physics && self.family.joints == other.family.joints
     }
 }
 
-/// Every candidate for a problem.
-pub fn library(dictionary: &Dictionary) -> Vec<Candidate> {
+/// Every form of every physics that the residuals can show.
+pub fn library(dictionary: &Dictionary) -> Vec<Arc<Family>> {
     let mut all = Vec::new();
     friction::push(dictionary, &mut all);
     inertial::push(dictionary, &mut all);
@@ -87,6 +166,20 @@ pub fn library(dictionary: &Dictionary) -> Vec<Candidate> {
     kinematic::push(dictionary, &mut all);
     timing::push(dictionary, &mut all);
     environment::push(dictionary, &mut all);
-    all.retain(|candidate| candidate.columns.iter().all(|column| !column.is_empty()));
-    all
+    all.into_iter().map(Arc::new).collect()
+}
+
+/// All combinations of the axes of a grid.
+fn product(axes: &[&[f64]]) -> Vec<Vec<f64>> {
+    axes.iter().fold(vec![Vec::new()], |all, axis| {
+        all.iter()
+            .flat_map(|head| {
+                axis.iter().map(move |x| {
+                    let mut point = head.clone();
+                    point.push(*x);
+                    point
+                })
+            })
+            .collect()
+    })
 }
