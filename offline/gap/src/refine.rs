@@ -6,6 +6,8 @@ use crate::hypothesis::{Candidate, Dictionary, Family};
 
 /// Halvings of a step before a number is settled.
 const HALVINGS: usize = 7;
+/// Times that secants are drawn to the last coefficients.
+const SECANTS: usize = 4;
 /// Rounds over all numbers of a shape.
 const ROUNDS: usize = 2;
 
@@ -24,21 +26,32 @@ pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidat
     })
 }
 
+/// Misfit of a candidate and its coefficients; infinite where they may not be.
+pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + 'a;
+
 /// The candidate with its refinable numbers, and its onset, moved to where the misfit is least.
-pub fn refined(dictionary: &Dictionary, start: &Candidate, misfit: &dyn Fn(&Candidate) -> f64) -> Candidate {
+pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
+    let misfit = &|candidate: &Candidate| fitted(candidate).0;
     let family = &start.family;
     let mut best = start.clone();
     let mut least = misfit(&best);
-    let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.refined[*k]).collect();
+    if family.secant {
+        for _ in 0..SECANTS {
+            let shape = fitted(&best).1[..family.shape.len()].to_vec();
+            best = Candidate::new(dictionary, family, &shape, best.onset_s);
+        }
+        least = misfit(&best);
+    }
+    let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
     let rounds = if free.len() + usize::from(best.onset_s.is_some()) > 1 { ROUNDS } else { 1 };
     for _ in 0..rounds {
         for &k in &free {
-            let mut step = 0.5 * spacing(family, k, best.shape[k]);
+            let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
             for _ in 0..HALVINGS {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
-                    // A positive number stays one.
-                    if here > 0.0 && there <= 0.0 {
+                    // A positive number of a grid stays one.
+                    if family.steps[k].is_some_and(f64::is_nan) && here > 0.0 && there <= 0.0 {
                         continue;
                     }
                     let mut shape = best.shape.clone();

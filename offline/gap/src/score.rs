@@ -50,6 +50,8 @@ pub struct Gain {
     pub nats: f64,
     /// Its standard error over blocks.
     pub error: f64,
+    /// What remains without the block that says most.
+    pub least: f64,
 }
 
 impl<'a> Scorer<'a> {
@@ -69,6 +71,11 @@ impl<'a> Scorer<'a> {
             }
         }
         left
+    }
+
+    /// Takes every row for itself.
+    pub fn untempered(&mut self) {
+        self.correlation.fill(1.0);
     }
 
     /// Takes the correlation times of a fit's residual.
@@ -217,7 +224,8 @@ impl<'a> Scorer<'a> {
         let left: Vec<f64> = (0..blocks).map(|b| total(Some(b))).collect();
         let mean = left.iter().sum::<f64>() / blocks as f64;
         let spread: f64 = left.iter().map(|x| (x - mean).powi(2)).sum();
-        Gain { nats: total(None), error: ((blocks - 1) as f64 / blocks as f64 * spread).sqrt() }
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        Gain { nats: total(None), least, error: ((blocks - 1) as f64 / blocks as f64 * spread).sqrt() }
     }
 }
 

@@ -15,13 +15,18 @@ pub struct Thresholds {
     pub nats: f64,
     /// Least share of the remaining squared error of its best cell that a further effect has to remove.
     pub share: f64,
+    /// Least RMS of a further effect, of the largest effect's in some cell where it helps: what is smaller may be the
+    /// larger one's model error.
+    pub amplitude: f64,
+    /// Claims whose scores differ by less than this share are equal: the simpler one is taken.
+    pub equal: f64,
     /// Most effects.
     pub effects: usize,
 }
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { nats: 12.0, share: 0.15, effects: 4 }
+        Self { nats: 12.0, share: 0.15, amplitude: 0.1, equal: 0.02, effects: 4 }
     }
 }
 
@@ -102,14 +107,20 @@ pub fn search<'p>(
         let base = search.grams(&chosen, None);
         let ranked = search.rank(&base);
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
-        let Some(best) = ranked.into_iter().next() else { break };
-        let (best, share) = search.judged(&base, best);
-        trace(format!("  best: {} removes {:.1} % of its cell", describe(&best), 100.0 * share));
-        if !search.accepts(&best, share, chosen.len()) {
-            next = Some(best);
-            break;
+        let mut accepted = None;
+        for scored in ranked.into_iter().take(5) {
+            let (judged, share, amplitude) = search.judged(&base, &chosen, scored);
+            trace(format!("  judged: {} removes {:.1} %, amplitude {amplitude:.2}", describe(&judged), 100.0 * share));
+            if search.accepts(&judged, share, amplitude) {
+                accepted = Some(judged);
+                break;
+            }
+            next = next.or(Some(judged));
         }
+        let Some(best) = accepted else { break };
+        next = None;
         chosen.push(best.candidate);
+        search.polish(&mut chosen);
     }
     let effects = search.settle(&mut chosen, trace);
     let grams = search.grams(&chosen, None);
@@ -125,21 +136,57 @@ impl Search<'_, '_> {
         })
     }
 
-    /// Gain with the correlation that the model itself leaves, and the share that it removes.
-    fn judged(&mut self, base: &Grams, scored: Scored) -> (Scored, f64) {
+    /// Gain with the correlation that the model itself leaves, the share of a cell that it removes, and its RMS over the
+    /// largest other effect's where it removes as much as is asked.
+    fn judged(&mut self, base: &Grams, others: &[Candidate], scored: Scored) -> (Scored, f64, f64) {
         let before = self.scorer.fit(base);
         let grams = self.scorer.extended(base, &scored.candidate.columns);
         let after = self.scorer.fit(&grams);
         self.scorer.temper(&grams, &after);
         let gain = self.scorer.gain(&before, &after);
         let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
-        let share = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).fold(0.0, f64::max);
-        (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share)
+        let shares: Vec<f64> = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).collect();
+        let mut start = 0;
+        let mut sizes: Vec<Vec<f64>> = Vec::new();
+        for candidate in others.iter().chain([&scored.candidate]) {
+            let theta = &after.coefficients[start..start + candidate.columns.len()];
+            start += theta.len();
+            sizes.push((0..shares.len()).map(|c| candidate.rms(c, theta)).collect());
+        }
+        let own = sizes.pop().unwrap_or_default();
+        let amplitude = (0..shares.len())
+            .filter(|c| shares[*c] >= self.thresholds.share)
+            .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
+            .fold(0.0, f64::max);
+        let share = shares.into_iter().fold(0.0, f64::max);
+        let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
+        (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)
     }
 
-    fn accepts(&self, best: &Scored, share: f64, beside: usize) -> bool {
-        let needed = if beside == 0 { 0.0 } else { self.thresholds.share };
-        best.score >= self.thresholds.nats && best.gain.nats >= 2.0 * best.gain.error && share >= needed
+    fn accepts(&self, best: &Scored, share: f64, amplitude: f64) -> bool {
+        let alone = amplitude.is_infinite();
+        best.score >= self.thresholds.nats
+            && best.gain.least >= 0.5 * self.thresholds.nats
+            && (alone || (share >= self.thresholds.share && amplitude >= self.thresholds.amplitude))
+    }
+
+    /// Shapes of all that was chosen, one after the other, beside the rest.
+    fn polish(&self, chosen: &mut [Candidate]) {
+        if chosen.len() < 2 {
+            return;
+        }
+        for k in 0..chosen.len() {
+            let base = self.grams(chosen, Some(k));
+            chosen[k] = self.refined(&base, &chosen[k]);
+        }
+    }
+
+    fn refined(&self, base: &Grams, candidate: &Candidate) -> Candidate {
+        refined(self.dictionary, candidate, &|candidate| {
+            let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
+            let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+            (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
+        })
     }
 
     /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
@@ -149,51 +196,48 @@ impl Search<'_, '_> {
         'again: loop {
             sweep += 1;
             effects.clear();
-            for k in 0..chosen.len() {
-                let base = self.grams(chosen, Some(k));
-                // Claims that stand beside are not also rivals.
-                let others: Vec<Candidate> = chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+            // The last ones first: they explain what the first ones may explain as well, once refined alone.
+            for k in (0..chosen.len()).rev() {
+                let mut others: Vec<Candidate> = chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+                if let [only] = others.as_mut_slice() {
+                    *only = self.refined(&self.scorer.empty(), only);
+                } else {
+                    self.polish(&mut others);
+                }
+                let base = self.grams(&others, None);
                 let mut ranked = self.rank(&base);
+                // Claims that stand beside are not also rivals.
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
                 let Some(best) = ranked.first().cloned() else { continue };
                 let swapped = !best.candidate.same_claim(&chosen[k]);
-                let (judged, share) = self.judged(&base, best);
-                if !self.accepts(&judged, share, others.len()) {
-                    trace(format!("  dropped {}", describe(&judged)));
-                    let _ = chosen.remove(k);
+                let (judged, share, amplitude) = self.judged(&base, &others, best);
+                if !self.accepts(&judged, share, amplitude) {
+                    trace(format!("  dropped {} share {share:.2} amplitude {amplitude:.2}", describe(&judged)));
+                    *chosen = others;
                     continue 'again;
                 }
-                if swapped {
+                if swapped && sweep < 4 {
                     trace(format!("  swapped for {}", describe(&judged)));
+                    chosen[k] = judged.candidate;
+                    self.polish(chosen);
+                    continue 'again;
                 }
                 chosen[k] = judged.candidate.clone();
-                if swapped && sweep < 4 {
-                    continue 'again;
-                }
-                let scale = judged.gain.nats / ranked[0].gain.nats.max(1e-9);
-                let rivals = ranked
-                    .into_iter()
-                    .skip(1)
-                    .map(|mut r| {
-                        // On the scale of the judged gain.
-                        r.gain.nats *= scale;
-                        r.score = r.gain.nats - price(&r.candidate);
-                        r
-                    })
-                    .collect();
+                let rivals = ranked.into_iter().skip(1).collect();
                 effects.push(Effect { chosen: judged, rivals, share });
             }
+            effects.reverse();
             return effects;
         }
     }
 
-    /// The best form of every claim, best claim first.
+    /// The best form of every claim, best claim first; on the scale of the correlation that the best leaves.
     fn rank(&mut self, grams: &Grams) -> Vec<Scored> {
         let base = self.scorer.fit(grams);
-        self.scorer.temper(grams, &base);
-        let score = |candidate: &Candidate| self.score(grams, &base, candidate);
-        let mut all = parallel(&self.candidates, &score);
+        self.scorer.untempered();
+        let mut all = parallel(&self.candidates, &|candidate| self.score(grams, &base, candidate));
         sort(&mut all);
+        self.temper_by(grams, all.first());
         // Effects that begin on the way: the best claims again, with an onset.
         let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
         let begun: Vec<Candidate> = distinct(&all)
@@ -209,16 +253,14 @@ impl Search<'_, '_> {
             })
             .filter(Candidate::shows)
             .collect();
-        all.extend(parallel(&begun, &score));
-        sort(&mut all);
-        let mut claims = distinct(&all);
+        let mut claims = self.again(grams, &base, all);
+        claims.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
+        sort(&mut claims);
+        let mut claims = distinct(&claims);
         // Between the grid's points, for those that may win.
         let best = claims.first().map_or(0.0, |s| s.score);
-        for scored in claims.iter_mut().take(5).filter(|s| s.score > 3.0 && s.score > 0.2 * best) {
-            let candidate = refined(self.dictionary, &scored.candidate, &|candidate| {
-                let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
-                if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }
-            });
+        for scored in claims.iter_mut().take(6).filter(|s| s.score > 3.0 && s.score > 0.1 * best) {
+            let candidate = self.refined(grams, &scored.candidate);
             if let Some(better) = self.score(grams, &base, &candidate)
                 && better.score > scored.score
             {
@@ -226,7 +268,26 @@ impl Search<'_, '_> {
             }
         }
         sort(&mut claims);
+        self.temper_by(grams, claims.first());
+        let mut claims = distinct(&self.again(grams, &base, claims));
+        parsimonious(&mut claims, self.thresholds.equal);
         claims
+    }
+
+    fn temper_by(&mut self, grams: &Grams, best: Option<&Scored>) {
+        if let Some(best) = best {
+            let grams = self.scorer.extended(grams, &best.candidate.columns);
+            let fit = self.scorer.fit(&grams);
+            self.scorer.temper(&grams, &fit);
+        }
+    }
+
+    /// Scores on the present scale.
+    fn again(&self, grams: &Grams, base: &Fit, scored: Vec<Scored>) -> Vec<Scored> {
+        let candidates: Vec<Candidate> = scored.into_iter().map(|s| s.candidate).collect();
+        let mut all = parallel(&candidates, &|candidate| self.score(grams, base, candidate));
+        sort(&mut all);
+        all
     }
 
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
@@ -240,6 +301,26 @@ impl Search<'_, '_> {
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
     candidate.family.penalty_nats + if candidate.onset_s.is_some() { 6.0 } else { 0.0 }
+}
+
+/// Brings the simplest of those that are as good as the best to the front.
+fn parsimonious(claims: &mut [Scored], equal: f64) {
+    let Some(best) = claims.first() else { return };
+    let within = best.score - (equal * best.score.abs()).max(3.0);
+    let simplest = (0..claims.len())
+        .take_while(|k| claims[*k].score >= within)
+        .min_by(|a, b| complexity(&claims[*a].candidate).total_cmp(&complexity(&claims[*b].candidate)));
+    if let Some(k) = simplest {
+        claims[..=k].rotate_right(1);
+    }
+}
+
+/// Numbers that a candidate fits, and between equals what is less usual.
+fn complexity(candidate: &Candidate) -> f64 {
+    let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
+    // What rounds a sign is not a claim of its own.
+    let rounding = candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "crossing")).count();
+    (candidate.columns.len() + shape - rounding + usize::from(candidate.onset_s.is_some())) as f64 + 0.1 * candidate.family.penalty_nats
 }
 
 fn sort(all: &mut [Scored]) {

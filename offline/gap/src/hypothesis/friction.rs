@@ -7,6 +7,9 @@ use crate::problem::Channel;
 /// Travel over which friction turns round, as shares of a joint's usual travel; 0: with the sign of the velocity alone.
 /// Below break-away a bristle keeps its force, which a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 4] = [0.0, 0.0005, 0.003, 0.015];
+/// A sign of the motion with the number that rounds it.
+type Turn = fn(&Dictionary, usize, f64) -> Vec<f64>;
+
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
@@ -36,30 +39,33 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     let travels = presliding(dictionary, j);
     let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.velocity[j][i]);
     let speed = size(&velocity(dictionary)).max(1e-9);
-    let by_load = move |d: &Dictionary, travel: f64| {
+    let by_load = move |d: &Dictionary, sign: &[f64]| {
         let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
-        d.effort_of(j, times(&turning(d, j, travel), &load), at_link)
+        d.effort_of(j, times(sign, &load), at_link)
     };
+    let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
     all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("v_eps", true)], product(&[&slowest]),
         move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)]));
     all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", true)], product(&[&travels[1..]]),
         move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)]));
-    all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", false)], product(&[&travels]),
-        move |d, s| vec![by_load(d, s[0])]).penalised(1.0));
-    all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("presliding", false)], product(&[&travels]),
-        move |d, s| vec![by_load(d, s[0]), d.effort_of(j, turning(d, j, s[0]), at_link)]).penalised(3.0));
+    for (name, starts, sign) in [("v_eps", &slowest[..], sign_below as Turn), ("presliding", &travels[1..], turning as Turn)] {
+        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], &[(name, true)], product(&[starts]),
+            move |d, s| vec![by_load(d, &sign(d, j, s[0]))]).penalised(1.0));
+        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive, positive], &[(name, true)], product(&[starts]),
+            move |d, s| { let sign = sign(d, j, s[0]); vec![by_load(d, &sign), d.effort_of(j, sign, at_link)] }).penalised(3.0));
+        if !at_link {
+            all.push(Family::shaped("thermal_drift", &[j], "friction fades", TORQUE, &[Bound::Free], &[("T", true), (name, true)],
+                product(&[&HEATING_S, starts]),
+                move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, s[1])), false)]).penalised(2.0));
+        }
+    }
     all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive],
         move |d| vec![d.effort_of(j, velocity(d), at_link)]));
     let slow = STRIBECK_SPEED.map(|share| share * speed);
-    all.push(Family::shaped("stribeck_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("v_s", true), ("a", true)],
-        product(&[&slow, &STRIBECK_EXPONENT]),
-        move |d, s| { let (sign, extra) = stribeck(d, j, s[0], s[1]); vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)] }).penalised(3.0));
-    if !at_link {
-        all.push(Family::shaped("thermal_drift", &[j], "friction fades", TORQUE, &[Bound::Free], &[("T", true), ("presliding", false)],
-            product(&[&HEATING_S, &travels]),
-            move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &turning(d, j, s[1])), false)]).penalised(2.0));
-    }
+    all.push(Family::shaped("stribeck_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("v_s", true), ("a", true), ("v_eps", true)],
+        product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]),
+        move |d, s| { let (sign, extra) = stribeck(d, j, s); vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)] }).penalised(3.0));
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.
@@ -95,19 +101,13 @@ fn sign_below(dictionary: &Dictionary, j: usize, eps: f64) -> Vec<f64> {
     dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect())
 }
 
-/// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`.
-fn stribeck(dictionary: &Dictionary, j: usize, slow: f64, exponent: f64) -> (Vec<f64>, Vec<f64>) {
-    let part = |extra: bool| {
-        dictionary.smoothed(|r| {
-            let motion = &dictionary.problem.pairs[r].real;
-            let eps = motion.sign_speed(j);
-            motion.quick_velocity[j]
-                .iter()
-                .map(|v| (v / eps).tanh() * if extra { (-(v.abs() / slow).powf(exponent)).exp() } else { 1.0 })
-                .collect()
-        })
-    };
-    (part(false), part(true))
+/// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, `v_eps`.
+fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let extra = dictionary.smoothed(|r| {
+        let curve = |v: &f64| (v / shape[2]).tanh() * (-(v.abs() / shape[0]).powf(shape[1])).exp();
+        dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(curve).collect()
+    });
+    (sign_below(dictionary, j, shape[2]), extra)
 }
 
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.

@@ -34,6 +34,18 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             move |d, s| vec![point_column(d, &y, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
         ));
     }
+    let own = y.clone();
+    let somewhere = Family::shaped(
+        "payload",
+        &[],
+        "on the last link",
+        TORQUE,
+        &[Bound::Positive],
+        &[("link", false), ("c_x", true), ("c_y", true), ("c_z", true)],
+        vec![vec![last as f64, tip.x, tip.y, tip.z]],
+        move |d, s| vec![point_column(d, &own, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
+    );
+    all.push(somewhere.stepped(&[None, Some(0.04), Some(0.04), Some(0.04)]).penalised(3.0));
     // Mass and first moment free; inertia about the origin of a small body follows from them only roughly, and weighs little.
     let own = y.clone();
     all.push(
@@ -144,27 +156,29 @@ fn independent(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize) -> 
     chosen
 }
 
-/// Small turns of gravity about the base's x and y.
+/// Gravity turned about the base's x and y, by `Exp([a, b, 0])`.
 fn push_gravity(all: &mut Vec<Family>) {
-    const TURN: f64 = 1e-4;
-    let turned = |dictionary: &Dictionary, axis: Vector3<f64>| {
-        let problem = dictionary.problem;
-        let mut robot = problem.robot.clone();
-        robot.arm.set_gravity(Rotation3::from_scaled_axis(axis * TURN) * problem.robot.arm.gravity_vector());
-        let mut turned = Evaluator::new(&robot, problem.nominal);
-        let torques: Vec<Vec<f64>> = dictionary
-            .grid
-            .iter()
-            .map(|&(r, i, k)| {
-                let state = problem.pairs[r].real.link(i);
-                turned.link(&state).iter().zip(&problem.loads[r][k].link).map(|(t, l)| (t - l) / TURN).collect()
-            })
-            .collect();
-        let series: Vec<Option<Vec<f64>>> = (0..dictionary.joints()).map(|j| Some(torques.iter().map(|t| t[j]).collect())).collect();
-        dictionary.effort(&series, true)
-    };
-    let bound = Bound::Between(-0.7, 0.7);
-    all.push(Family::fixed("gravity_direction", &[], "turned", TORQUE, &[bound, bound], move |d| {
-        vec![turned(d, Vector3::x()), turned(d, Vector3::y())]
+    let bound = Bound::Between(-0.9, 0.9);
+    all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[bound, bound], &["a", "b"], |d, s| {
+        // Along the shortest way: first a, then b; a secant of nothing is a tangent.
+        let s = [s[0], s[1]].map(|x| if x.abs() < 1e-4 { 1e-4 } else { x });
+        let (none, first, both) = (turned_load(d, 0.0, 0.0), turned_load(d, s[0], 0.0), turned_load(d, s[0], s[1]));
+        vec![difference(d, &first, &none, s[0]), difference(d, &both, &first, s[1])]
     }));
+}
+
+/// Load of the links at each grid row with gravity turned.
+fn turned_load(dictionary: &Dictionary, a: f64, b: f64) -> Vec<Vec<f64>> {
+    let problem = dictionary.problem;
+    let mut robot = problem.robot.clone();
+    robot.arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * problem.robot.arm.gravity_vector());
+    let mut turned = Evaluator::new(&robot, problem.nominal);
+    dictionary.grid.iter().map(|&(r, i, _)| turned.link(&problem.pairs[r].real.link(i))).collect()
+}
+
+/// Joint torques per unit between two loads.
+fn difference(dictionary: &Dictionary, there: &[Vec<f64>], here: &[Vec<f64>], step: f64) -> super::Column {
+    let of = |j: usize| there.iter().zip(here).map(|(t, h)| (t[j] - h[j]) / step).collect();
+    let series: Vec<Option<Vec<f64>>> = (0..dictionary.joints()).map(|j| Some(of(j))).collect();
+    dictionary.effort(&series, true)
 }

@@ -34,22 +34,28 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
     let last = dictionary.joints() - 1;
     all.push(Family::fixed("link_geometry", &[last], "length", TIP, &[small], longer));
-    let turned = Bound::Between(-0.7, 0.7);
+    let turned = Bound::Between(-0.9, 0.9);
     let moves = move |d: &Dictionary| axes.map(|axis| d.tip(|_, _, _| axis.into()));
+    let free = Bound::Free;
+    let turns = ["w_x", "w_y", "w_z"];
     all.push(
-        Family::fixed("frame_misalignment", &[], "turned and moved", TIP, &[turned, turned, turned, Bound::Free, Bound::Free, Bound::Free], move |d| {
-            let here = tips(d, &d.problem.robot.arm);
-            let mut columns = axes.map(|axis| d.tip(|_, _, row| axis.cross(&here[row]).into())).to_vec();
+        Family::secant("frame_misalignment", &[], "turned and moved", TIP, &[turned, turned, turned, free, free, free], &turns, move |d, s| {
+            let mut columns = turning(d, s);
             columns.extend(moves(d));
             columns
         })
         .penalised(1.0),
     );
-    all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[Bound::Free; 3], move |d| moves(d).to_vec()));
-    all.push(Family::fixed("frame_misalignment", &[], "turned", TIP, &[turned; 3], move |d| {
-        let here = tips(d, &d.problem.robot.arm);
-        axes.map(|axis| d.tip(|_, _, row| axis.cross(&here[row]).into())).to_vec()
-    }));
+    all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[free; 3], move |d| moves(d).to_vec()));
+    all.push(Family::secant("frame_misalignment", &[], "turned", TIP, &[turned; 3], &turns, turning));
+}
+
+/// `Exp(w) p - p`, one secant for each number of w.
+fn turning(dictionary: &Dictionary, w: &[f64]) -> Vec<Column> {
+    let here = tips(dictionary, &dictionary.problem.robot.arm);
+    let w: Vec<f64> = w.iter().map(|x| if x.abs() < 1e-5 { 1e-5 } else { *x }).collect();
+    let after = |k: usize| Rotation3::from_scaled_axis(Vector3::from_fn(|i, _| if i < k { w[i] } else { 0.0 }));
+    (0..3).map(|k| dictionary.tip(|_, _, row| ((after(k + 1) * here[row] - after(k) * here[row]) / w[k]).into())).collect()
 }
 
 /// Length of the tool: along its offset from the last link.

@@ -43,8 +43,11 @@ pub struct Family {
     pub shape: Vec<&'static str>,
     /// Shapes to begin with; one empty shape where there is nothing to search.
     pub grid: Vec<Vec<f64>>,
-    /// Which numbers of the shape are refined between the grid's; the others are choices.
-    pub refined: Vec<bool>,
+    /// First step of the numbers that are refined between the grid's; none for those that are choices. NaN: half the
+    /// distance to the grid's next.
+    pub steps: Vec<Option<f64>>,
+    /// Are the columns secants from 0 to the shape, so that the fit's own first coefficients are the next shape?
+    pub secant: bool,
     /// One per coefficient.
     pub bounds: Vec<Bound>,
     /// Rank among equals: smaller is simpler or likelier before any data.
@@ -75,7 +78,8 @@ impl Family {
             channel,
             shape: Vec::new(),
             grid: vec![Vec::new()],
-            refined: Vec::new(),
+            steps: Vec::new(),
+            secant: false,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
@@ -99,12 +103,35 @@ impl Family {
             form,
             channel,
             shape: shape.iter().map(|s| s.0).collect(),
-            refined: shape.iter().map(|s| s.1).collect(),
+            steps: shape.iter().map(|s| s.1.then_some(f64::NAN)).collect(),
+            secant: false,
             grid,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             columns: Arc::new(columns),
         }
+    }
+
+    /// A form in large numbers: the columns are secants from 0 to the shape, one coefficient for each of its numbers first.
+    pub fn secant(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        shape: &[&'static str],
+        columns: impl Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        let numbers: Vec<(&'static str, bool)> = shape.iter().map(|name| (*name, false)).collect();
+        let start = vec![vec![0.0; shape.len()]];
+        Self { secant: true, ..Self::shaped(physics, joints, form, channel, bounds, &numbers, start, columns) }
+    }
+
+    /// With the first steps of its refinement.
+    #[must_use]
+    pub fn stepped(mut self, steps: &[Option<f64>]) -> Self {
+        self.steps = steps.to_vec();
+        self
     }
 
     /// Less likely than its rivals by so much, before any data.
@@ -143,6 +170,18 @@ impl Candidate {
     /// A number of its shape.
     pub fn shape_of(&self, name: &str) -> Option<f64> {
         self.family.shape.iter().position(|n| *n == name).map(|k| self.shape[k])
+    }
+
+    /// RMS of the effect in a cell for given coefficients.
+    pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
+        let mut sum: Vec<f64> = Vec::new();
+        for (column, theta) in self.columns.iter().zip(coefficients) {
+            for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
+                sum.resize(values.len(), 0.0);
+                sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * x);
+            }
+        }
+        crate::nominal::rms(sum.into_iter())
     }
 
     /// Does every coefficient reach some residual?

@@ -183,6 +183,12 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let (small, free) = (Bound::Between(-0.5, 0.5), Bound::Free);
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
     all.push(Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]));
+    all.push(Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
+        // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
+        let mut column = ratio(d);
+        column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+        vec![column]
+    }));
     all.push(
         Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, free], move |d| {
             vec![ratio(d), offset(d, j)]
