@@ -46,6 +46,20 @@ fn main() {
         let dictionary = Dictionary::new(&problem);
         if verbose {
             println!("compliance {:?}", nominal.compliance);
+            if let Ok(path) = std::env::var("DUMP") {
+                let mut text = String::new();
+                for &(r, i, k) in &dictionary.grid {
+                    let _ = write!(text, "{r} {:.3}", i as f64 * 1e-3);
+                    for j in 0..robot.joint_count() {
+                        let m = &problem.pairs[r].real;
+                        let d = m.deflection.as_ref().map_or(0.0, |d| d[j][i]);
+                        let s = problem.pairs[r].sim.as_ref().and_then(|s| s.deflection.as_ref()).map_or(0.0, |d| d[j][i]);
+                        let _ = write!(text, " {:.6e} {:.6e} {:.6e} {:.6e} {:.6e}", problem.loads[r][k].link[j], d, s, m.position[j][i], m.velocity[j][i]);
+                    }
+                    text.push('\n');
+                }
+                std::fs::write(path, text).expect("dump");
+            }
             for cell in &problem.cells {
                 println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::nominal::rms(cell.residual.iter().copied()));
             }

@@ -26,7 +26,7 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { nats: 12.0, share: 0.15, amplitude: 0.1, equal: 0.02, effects: 4 }
+        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.02, effects: 4 }
     }
 }
 

@@ -31,7 +31,8 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         Family::fixed("external_contact", &[], "steady force", TORQUE, &[Bound::Free; 3], move |d| {
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| effort(d, &own, |_| axis)).to_vec()
         })
-        .penalised(2.0),
+        // A force that never lets go is a weight before it is a contact.
+        .penalised(10.0),
     );
     for (k, normal) in normals().into_iter().enumerate() {
         let along = tips.positions.iter().map(|tip| tip.dot(&normal));
