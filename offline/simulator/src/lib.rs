@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "joints index several vectors and matrices at once, as in the equations")]
 
+mod any_arm;
 pub mod controller;
 pub mod model;
 pub mod physics;
@@ -37,6 +38,6 @@ mod random;
 mod robot_plant;
 mod tool_axes;
 
-pub use model::{Effect, Robot, RobotError};
+pub use model::{Effect, Robot, RobotError, RobotModel};
 pub use random::Random;
 pub use simulation::{Command, CycleOfArm, Simulation, TruthSample};

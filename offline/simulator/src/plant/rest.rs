@@ -1,6 +1,6 @@
 //! Where the joints are while the motors stand still.
 
-use super::{Plant, State, Vector};
+use super::{Between, Plant, State, Vector};
 
 impl Plant {
     /// The state at rest with motors at given angles, rad: cables carry gravity, friction and dead bands carry nothing.
@@ -15,6 +15,11 @@ impl Plant {
         for i in 0..n {
             state.joints[i] = (0..n).map(|k| self.coupling_inverse[i][k] * seen[k]).sum();
         }
+        // Where rigid motors put their joints.
+        let mut held = seen;
+        if self.shifted {
+            self.shift(&mut held, &mut [0.0; super::JOINTS_MAX]);
+        }
         let Some(coupling_inverse) = super::inverse(&self.coupling, n) else { return state };
         let mut gravity = [0.0; super::JOINTS_MAX];
         for _ in 0..50 {
@@ -26,6 +31,10 @@ impl Plant {
             for i in 0..n {
                 let carried: f64 = (0..n).map(|k| coupling_inverse[k][i] * (gravity[k] - external[k])).sum();
                 let drive = &self.drives[i];
+                if drive.nominal.between == Between::Rigid {
+                    missing[i] = (0..n).map(|j| self.coupling[i][j] * state.joints[j]).sum::<f64>() - held[i];
+                    continue;
+                }
                 let cable = drive.elastic(found.position[i], 0.0, &state.memories);
                 let wanted = carried - cable.torque;
                 // Inside a dead band the cable has a slope but no torque: step out of it.
