@@ -23,13 +23,14 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "joints index several vectors and matrices at once, as in the equations")]
 
-mod any_arm;
+pub mod any_arm;
 pub mod controller;
 pub mod model;
 pub mod physics;
 pub mod plant;
 pub mod production;
 pub mod replay;
+pub mod resimulate;
 pub mod simulation;
 pub mod trajectory;
 

@@ -103,7 +103,7 @@ impl Plant {
     }
 
     /// Torque with which the cables pull back, in joint units on the motor's side: `(dx/dm)^T T` without the ratio.
-    fn reaction(&self, torque: &Vector, slope: &Vector) -> Vector {
+    pub(super) fn reaction(&self, torque: &Vector, slope: &Vector) -> Vector {
         if !self.shifted {
             return *torque;
         }

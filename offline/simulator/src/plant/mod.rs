@@ -8,6 +8,7 @@
 mod cable;
 mod drive;
 mod evaluate;
+mod inverse;
 mod rest;
 mod rigid;
 mod step;
@@ -18,6 +19,7 @@ use nalgebra::Vector3;
 pub use cable::{CableForce, CableLaw};
 pub use drive::{Between, DriveNumbers, Passive, Rubbing};
 pub(crate) use drive::{Drive, Stiction, Timed, on};
+pub use inverse::{Given, Memory, Needed};
 pub use step::Method;
 
 use crate::physics::{ExternalContact, GravityDirection, JointCoupling, JointOffset, LinkInertia, Payload};
@@ -332,7 +334,7 @@ impl Plant {
 }
 
 /// Inverse of the leading `n` by `n` part, by Gauss-Jordan with pivots; none if singular.
-fn inverse(matrix: &Matrix, n: usize) -> Option<Matrix> {
+pub(crate) fn inverse(matrix: &Matrix, n: usize) -> Option<Matrix> {
     let mut left = nalgebra::DMatrix::from_fn(n, n, |row, column| matrix[row][column]);
     if !left.try_inverse_mut() {
         return None;

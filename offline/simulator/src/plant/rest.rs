@@ -1,13 +1,18 @@
 //! Where the joints are while the motors stand still.
 
-use super::{Between, Plant, State, Vector};
+use super::{Between, MEMORIES_MAX, Plant, State, Vector};
 
 impl Plant {
     /// The state at rest with motors at given angles, rad: cables carry gravity, friction and dead bands carry nothing.
     /// Found by Newton steps on the static balance; play is then settled by the first milliseconds of any run.
     pub fn at_rest(&mut self, motors: &Vector) -> State {
+        self.at_rest_with(motors, &State::ZERO.memories)
+    }
+
+    /// The same with what hysteresis, creep and warmth remember.
+    pub fn at_rest_with(&mut self, motors: &Vector, memories: &[f64; MEMORIES_MAX]) -> State {
         let n = self.joints;
-        let mut state = State { motors: *motors, ..State::ZERO };
+        let mut state = State { motors: *motors, memories: *memories, ..State::ZERO };
         let mut seen = [0.0; super::JOINTS_MAX];
         for i in 0..n {
             seen[i] = motors[i] / self.drives[i].nominal.ratio;

@@ -87,23 +87,31 @@ impl Plant {
             return;
         }
         let n = self.joints;
-        let mut wanted: [f64; JOINTS_MAX] = std::array::from_fn(|i| state.motors[i] / self.drive_ratio(i));
-        let mut rates: [f64; JOINTS_MAX] = std::array::from_fn(|i| state.speeds[i] / self.drive_ratio(i));
-        self.see_rigid(state, &mut wanted, &mut rates);
-        let mut seen = wanted;
+        let mut wanted: Vector = std::array::from_fn(|i| state.motors[i] / self.drive_ratio(i));
+        let mut rates: Vector = std::array::from_fn(|i| state.speeds[i] / self.drive_ratio(i));
         if self.shifted {
-            for _ in 0..ROUNDS {
-                let mut shifted = seen;
-                let mut unused = [0.0; JOINTS_MAX];
-                self.shift(&mut shifted, &mut unused);
-                for i in (0..n).filter(|i| self.is_rigid(*i)) {
-                    seen[i] += wanted[i] - shifted[i];
-                }
-            }
+            self.shift(&mut wanted, &mut [0.0; JOINTS_MAX]);
         }
+        self.see_rigid(state, &mut wanted, &mut rates);
+        let (seen, _) = self.unshifted(&wanted);
         for i in (0..n).filter(|i| self.is_rigid(*i)) {
             (state.motors[i], state.speeds[i]) = (seen[i] * self.drive_ratio(i), rates[i] * self.drive_ratio(i));
         }
+    }
+
+    /// Motor-side positions that a shift turns into the given ones, and the slope of the shift there.
+    pub(super) fn unshifted(&self, shifted: &Vector) -> (Vector, Vector) {
+        let (mut seen, mut slope) = (*shifted, [0.0; JOINTS_MAX]);
+        if self.shifted {
+            for _ in 0..ROUNDS {
+                let mut found = seen;
+                slope = self.shift(&mut found, &mut [0.0; JOINTS_MAX]);
+                for i in 0..self.joints {
+                    seen[i] += shifted[i] - found[i];
+                }
+            }
+        }
+        (seen, slope)
     }
 
     fn drive_ratio(&self, joint: usize) -> f64 {
