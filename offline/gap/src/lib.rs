@@ -2,14 +2,25 @@
 #![deny(missing_docs)]
 
 pub mod filter;
+pub mod intervals;
 pub mod linear;
 pub mod motion;
 pub mod nominal;
+pub mod parameters;
 pub mod problem;
 pub mod robot;
 pub mod run;
+pub mod flexible;
 pub mod hypothesis;
 pub mod noise;
 pub mod refine;
 pub mod score;
 pub mod search;
+
+pub mod analysis;
+mod corrected;
+mod experiment;
+mod gates;
+mod pictures;
+mod regime;
+pub mod verdicts;

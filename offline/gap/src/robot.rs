@@ -2,6 +2,7 @@
 
 use arm::serial::SerialArm;
 use nalgebra::DMatrix;
+use simulator::model::{Connection, RobotError, RobotModel};
 
 /// What one drive is believed to be, on the joint's side of the gearbox.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,11 +15,15 @@ pub struct DriveNominal {
     pub viscous: f64,
     /// Series stiffness between motor and joint, N·m/rad or N/m; infinite for a rigid one.
     pub stiffness: f64,
+    /// Torque at the shaft per command count, N·m, with the drive's sign; 0 where not known.
+    pub torque_per_count: f64,
+    /// Joint position where the motor stands at 0.
+    pub offset: f64,
 }
 
 impl Default for DriveNominal {
     fn default() -> Self {
-        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY }
+        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY, torque_per_count: 0.0, offset: 0.0 }
     }
 }
 
@@ -40,6 +45,8 @@ pub struct Robot {
     pub arm: SerialArm,
     /// Names of the joints.
     pub joints: Vec<String>,
+    /// Names of the links.
+    pub links: Vec<String>,
     /// Does the joint slide?
     pub prismatic: Vec<bool>,
     /// Motor positions from joint positions, N×N: `m = A q` (gap-design.md, section 2).
@@ -54,25 +61,39 @@ impl Robot {
     /// A robot from its URDF.
     ///
     /// # Errors
-    /// What the URDF reader says.
-    pub fn from_urdf(text: &str) -> Result<Self, arm::urdf::UrdfError> {
-        let loaded = arm::urdf::load(text)?;
-        let n = loaded.arm.joint_count();
-        let drives = loaded
-            .drives
-            .iter()
-            .map(|drive| DriveNominal { coulomb: drive.friction, viscous: drive.damping, ..DriveNominal::default() })
-            .collect();
-        let motor_from_joint = DMatrix::from_fn(n, n, |i, j| if i == j { loaded.drives[i].reduction } else { 0.0 });
-        Ok(Self {
-            name: loaded.arm.name().to_owned(),
-            joints: loaded.arm.bodies().iter().map(|body| body.joint.name.clone()).collect(),
-            prismatic: loaded.arm.bodies().iter().map(|body| body.joint.kind.is_prismatic()).collect(),
-            arm: loaded.arm,
+    /// What the reader says.
+    pub fn from_urdf(text: &str) -> Result<Self, RobotError> {
+        Ok(Self::of(&RobotModel::from_urdf(text)?))
+    }
+
+    /// What the engine needs of a robot model. RAVEN-II: joints 1 to 3, those with dynamics.
+    pub fn of(model: &RobotModel) -> Self {
+        let arm = model.arm();
+        let n = model.joint_count().min(arm.joint_count());
+        let a = model.motor_from_joint();
+        let motor_from_joint = DMatrix::from_fn(n, n, |i, j| a[i][j]);
+        let drives = model.drives().into_iter().take(n).map(|drive| {
+            let reduction = drive.reduction;
+            DriveNominal {
+                rotor_inertia: drive.rotor_inertia_kg_m2 * reduction * reduction,
+                coulomb: drive.motor_coulomb_nm * reduction.abs() + drive.joint_coulomb,
+                viscous: drive.motor_viscous_nm_s * reduction * reduction + drive.joint_viscous,
+                stiffness: if drive.connection == Connection::Cable { drive.stiffness } else { f64::INFINITY },
+                torque_per_count: drive.torque_per_count_nm(),
+                offset: drive.offset,
+            }
+        });
+        let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m });
+        Self {
+            name: model.name().to_owned(),
+            joints: model.joint_names().into_iter().take(n).collect(),
+            links: model.link_names().into_iter().take(n).collect(),
+            prismatic: arm.bodies().iter().take(n).map(|body| body.joint.kind.is_prismatic()).collect(),
+            drives: drives.collect(),
+            payload_sites: sites.collect(),
             motor_from_joint,
-            drives,
-            payload_sites: Vec::new(),
-        })
+            arm,
+        }
     }
 
     /// Number of joints.

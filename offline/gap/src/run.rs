@@ -85,14 +85,22 @@ impl Run {
         let n = robot.joint_count();
         let clock = Clock::new(time);
         let series = |name: &str| recording.column(name).map(|column| clock.resample(time, column));
-        let all = |name: &dyn Fn(usize) -> String| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>();
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
-        let motor = all(&|j| format!("mpos_{}_rad", j + 1));
-        let reported = all(&|j| format!("jpos_{}_{}", j + 1, unit(j)));
+        // The first of the names that every joint has.
+        let all = |names: &[&dyn Fn(usize) -> String]| {
+            names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
+        };
+        let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
+        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1)]);
+        let from_motors = motor.is_some();
         let position = match (&motor, reported) {
             (Some(motor), _) => {
                 let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
-                combine(&inverse, motor)
+                let mut joints = combine(&inverse, motor);
+                for (series, drive) in joints.iter_mut().zip(&robot.drives) {
+                    series.iter_mut().for_each(|q| *q += drive.offset);
+                }
+                joints
             }
             (None, Some(reported)) => reported,
             (None, None) => {
@@ -100,8 +108,20 @@ impl Run {
                 return Err(RunError::NoPosition { run, joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n });
             }
         };
-        let motor_torque = all(&|j| format!("tau_{}_nm", j + 1)).map(|tau| combine(&robot.motor_from_joint.transpose(), &tau));
-        let joint_torque = || all(&|j| format!("jtau_{}_{}", j + 1, if robot.prismatic[j] { "n" } else { "nm" }));
+        let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
+        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none()).map(at_joints);
+        let joint_torque = || {
+            let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
+            all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
+                format!("tau_{}_{}", j + 1, if robot.prismatic[j] { "N" } else { "Nm" })
+            }])
+        };
+        let counted = || {
+            let known = robot.drives.iter().all(|drive| drive.torque_per_count != 0.0);
+            let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
+            let torque = counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
+            Some(at_joints(torque.collect()))
+        };
         let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
         let tip = match tip {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
@@ -112,9 +132,9 @@ impl Run {
             start_s: clock.start_s,
             dt_s: clock.dt_s,
             position,
-            torque: motor_torque.or_else(joint_torque),
-            truth: all(&|j| format!("truth_jpos_{}_{}", j + 1, unit(j))),
-            command: all(&|j| format!("jpos_d_{}_{}", j + 1, unit(j))),
+            torque: motor_torque.or_else(joint_torque).or_else(counted),
+            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
+            command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
         })

@@ -208,6 +208,12 @@ impl<'a> Scorer<'a> {
         self.whitened[cell].len() as f64
     }
 
+    /// Gain of `better` over `base` on what was held out, per cell, nats.
+    pub fn gain_by_cell(&self, base: &Fit, better: &Fit) -> Vec<f64> {
+        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>().max(1e-300);
+        (0..base.held_out.len()).map(|c| 0.5 * self.rows(c) / self.correlation[c] * (sum(base, c) / sum(better, c)).ln()).collect()
+    }
+
     /// Gain of `better` over `base` on what was held out.
     pub fn gain(&self, base: &Fit, better: &Fit) -> Gain {
         let total = |skip: Option<usize>| -> f64 {

@@ -85,7 +85,7 @@ fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3
 }
 
 /// Directions of walls: the six axes and the twelve between two of them.
-pub(crate) fn normals() -> Vec<Vector3<f64>> {
+pub fn normals() -> Vec<Vector3<f64>> {
     let mut all = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {

@@ -72,14 +72,15 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 .penalised(1.0),
             );
         }
+        // The parameter that the motion shows best comes first, and is the one that is reported.
         let free = independent(dictionary, &y, link);
+        let Some(first) = free.first().map(|k| *k as f64) else { continue };
         let y = y.clone();
-        all.push(
-            Family::fixed("link_inertia", &[link], "free", TORQUE, &vec![Bound::Free; free.len()], move |d| {
-                free.iter().map(|k| parameter_column(d, &y, link, *k)).collect()
-            })
-            .penalised(4.0),
-        );
+        let bounds = vec![Bound::Free; free.len()];
+        let family = Family::shaped("link_inertia", &[link], "free", TORQUE, &bounds, &[("parameter", false)], vec![vec![first]], move |d, _| {
+            free.iter().map(|k| parameter_column(d, &y, link, *k)).collect()
+        });
+        all.push(family.penalised(4.0));
     }
     push_gravity(all);
 }

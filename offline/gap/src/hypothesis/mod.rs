@@ -12,6 +12,7 @@ mod transmission;
 use std::sync::Arc;
 
 pub use dictionary::{Column, Dictionary};
+pub use environment::normals;
 
 use crate::problem::Channel;
 
@@ -172,8 +173,8 @@ impl Candidate {
         self.family.shape.iter().position(|n| *n == name).map(|k| self.shape[k])
     }
 
-    /// RMS of the effect in a cell for given coefficients.
-    pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
+    /// The effect in a cell for given coefficients; empty where it has none.
+    pub fn effect(&self, cell: usize, coefficients: &[f64]) -> Vec<f64> {
         let mut sum: Vec<f64> = Vec::new();
         for (column, theta) in self.columns.iter().zip(coefficients) {
             for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
@@ -181,7 +182,12 @@ impl Candidate {
                 sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * x);
             }
         }
-        crate::nominal::rms(sum.into_iter())
+        sum
+    }
+
+    /// RMS of the effect in a cell for given coefficients.
+    pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
+        crate::nominal::rms(self.effect(cell, coefficients).into_iter())
     }
 
     /// Does every coefficient reach some residual?
