@@ -24,6 +24,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) out: &'a Path,
     /// Written into the report.
     pub(crate) seed: u64,
+    /// Say what the search tries.
+    pub(crate) trace: bool,
 }
 
 /// Progress is shown on a terminal, and only of what takes longer.
@@ -46,6 +48,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let options = Options {
         thresholds,
         seed: wish.seed,
+        trace: wish.trace,
         config_sha256: sha256(format!("{text}{thresholds:?}{}", wish.seed).as_bytes()),
         urdf_sha256: urdf.map(|path| hash(Path::new(path))).transpose()?,
     };

@@ -99,6 +99,9 @@ enum Command {
         /// Of everything random; written into the report
         #[arg(long, default_value_t = 0)]
         seed: u64,
+        /// Say on standard error what the search tries
+        #[arg(long)]
+        trace: bool,
     },
     /// Log the running service's states and poses to MCAP, on one clock; a kill loses at most the last second
     Record {
@@ -175,8 +178,8 @@ fn main() -> ExitCode {
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
         Command::Pair { run, truth, out, same } => pair::run(&run, truth.as_deref(), &out, same),
-        Command::Gap { real, sim, robot, out, seed } => {
-            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed })
+        Command::Gap { real, sim, robot, out, seed, trace } => {
+            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace })
         }
         Command::Record { out, seconds } => record::run(&out, seconds),
         Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => {

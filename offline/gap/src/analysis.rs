@@ -39,6 +39,8 @@ pub struct Options {
     pub seed: u64,
     /// SHA-256 of the robot model and the options.
     pub config_sha256: String,
+    /// Says on standard error what the search tries.
+    pub trace: bool,
     /// SHA-256 of the URDF, if the robot came as one.
     pub urdf_sha256: Option<String>,
 }
@@ -155,7 +157,11 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
-    let mut answer = search(&problem, &dictionary, &options.thresholds, &mut |_| {});
+    let mut answer = search(&problem, &dictionary, &options.thresholds, &mut |line| {
+        if options.trace {
+            eprintln!("{line}");
+        }
+    });
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
     let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);

@@ -6,7 +6,7 @@ use crate::hypothesis::{Candidate, Dictionary, Family, library};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
-use crate::score::{Fit, Gain, Grams, Scorer, within_bounds};
+use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +105,7 @@ pub fn search<'p>(
     let mut next = None;
     while chosen.len() < thresholds.effects {
         let base = search.grams(&chosen, None);
-        let ranked = search.rank(&base);
+        let ranked = search.rank(&chosen);
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
         let mut accepted = None;
         for scored in ranked.into_iter().take(5) {
@@ -142,8 +142,7 @@ impl Search<'_, '_> {
         let before = self.scorer.fit(base);
         let grams = self.scorer.extended(base, &scored.candidate.columns);
         let after = self.scorer.fit(&grams);
-        self.scorer.temper(&grams, &after);
-        let gain = self.scorer.gain(&before, &after);
+        let gain = self.significance(others, &scored.candidate);
         let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
         let shares: Vec<f64> = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).collect();
         let mut start = 0;
@@ -161,6 +160,49 @@ impl Search<'_, '_> {
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
         (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)
+    }
+
+    /// Gain of a candidate over the others with the noise that it leaves itself (Cochrane-Orcutt): by its autoregression, or
+    /// by the number of rows that count as one; whichever says more. Noise that an effect only seems to explain stays in
+    /// what it leaves, and is whitened away.
+    fn significance(&self, others: &[Candidate], candidate: &Candidate) -> Gain {
+        let mut best: Option<Gain> = None;
+        let all = |scorer: &Scorer| {
+            let base = others.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
+            let with = scorer.extended(&base, &candidate.columns);
+            (base, with)
+        };
+        let (_, with) = all(&self.scorer);
+        let noise = self.noise_left(others, candidate, &self.scorer.fit(&with));
+        for noise in [window_noise(self.problem), noise] {
+            let mut scorer = Scorer::new(self.problem, noise);
+            let (base, with) = all(&scorer);
+            let (before, after) = (scorer.fit(&base), scorer.fit(&with));
+            scorer.temper(&with, &after);
+            let gain = scorer.gain(&before, &after);
+            if best.is_none_or(|b| gain.nats > b.nats) {
+                best = Some(gain);
+            }
+        }
+        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0 })
+    }
+
+    /// Autoregression of what a set leaves, per cell.
+    fn noise_left(&self, others: &[Candidate], candidate: &Candidate, fit: &Fit) -> Vec<Noise> {
+        let all = || others.iter().chain([candidate]);
+        (0..self.problem.cells.len())
+            .map(|c| {
+                let mut left = self.problem.cells[c].residual.clone();
+                let mut start = 0;
+                for own in all() {
+                    let theta = &fit.coefficients[start..start + own.columns.len()];
+                    start += theta.len();
+                    left.iter_mut().zip(own.effect(c, theta)).for_each(|(y, p)| *y -= p);
+                }
+                let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
+                Noise::fit(&parts)
+            })
+            .collect()
     }
 
     fn accepts(&self, best: &Scored, share: f64, amplitude: f64) -> bool {
@@ -205,7 +247,7 @@ impl Search<'_, '_> {
                     self.polish(&mut others);
                 }
                 let base = self.grams(&others, None);
-                let mut ranked = self.rank(&base);
+                let mut ranked = self.rank(&others);
                 // Claims that stand beside are not also rivals.
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
                 let Some(best) = ranked.first().cloned() else { continue };
@@ -231,13 +273,14 @@ impl Search<'_, '_> {
         }
     }
 
-    /// The best form of every claim, best claim first; on the scale of the correlation that the best leaves.
-    fn rank(&mut self, grams: &Grams) -> Vec<Scored> {
+    /// The best form of every claim beside the others, best claim first. Claims are ordered by how much of the error they
+    /// explain; the scale is that of the first one's significance.
+    fn rank(&mut self, others: &[Candidate]) -> Vec<Scored> {
+        let grams = &self.grams(others, None);
         let base = self.scorer.fit(grams);
         self.scorer.untempered();
         let mut all = parallel(&self.candidates, &|candidate| self.score(grams, &base, candidate));
         sort(&mut all);
-        self.temper_by(grams, all.first());
         // Effects that begin on the way: the best claims again, with an onset.
         let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
         let begun: Vec<Candidate> = distinct(&all)
@@ -253,10 +296,9 @@ impl Search<'_, '_> {
             })
             .filter(Candidate::shows)
             .collect();
-        let mut claims = self.again(grams, &base, all);
-        claims.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
-        sort(&mut claims);
-        let mut claims = distinct(&claims);
+        all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
+        sort(&mut all);
+        let mut claims = distinct(&all);
         // Between the grid's points, for those that may win.
         let best = claims.first().map_or(0.0, |s| s.score);
         for scored in claims.iter_mut().take(6).filter(|s| s.score > 3.0 && s.score > 0.1 * best) {
@@ -268,26 +310,17 @@ impl Search<'_, '_> {
             }
         }
         sort(&mut claims);
-        self.temper_by(grams, claims.first());
-        let mut claims = distinct(&self.again(grams, &base, claims));
+        let mut claims = distinct(&claims);
+        if let Some(best) = claims.first().filter(|best| best.gain.nats > 0.0) {
+            let scale = (self.significance(others, &best.candidate).nats.max(0.0) / best.gain.nats).min(1.0);
+            for scored in &mut claims {
+                scored.gain = Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
+                scored.score = scored.gain.nats - price(&scored.candidate);
+            }
+        }
+        sort(&mut claims);
         parsimonious(&mut claims, self.thresholds.equal);
         claims
-    }
-
-    fn temper_by(&mut self, grams: &Grams, best: Option<&Scored>) {
-        if let Some(best) = best {
-            let grams = self.scorer.extended(grams, &best.candidate.columns);
-            let fit = self.scorer.fit(&grams);
-            self.scorer.temper(&grams, &fit);
-        }
-    }
-
-    /// Scores on the present scale.
-    fn again(&self, grams: &Grams, base: &Fit, scored: Vec<Scored>) -> Vec<Scored> {
-        let candidates: Vec<Candidate> = scored.into_iter().map(|s| s.candidate).collect();
-        let mut all = parallel(&candidates, &|candidate| self.score(grams, base, candidate));
-        sort(&mut all);
-        all
     }
 
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {

@@ -112,6 +112,8 @@ fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<
 
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.
 pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64> {
+    // Faster heating is no heating: it would pass for a constant.
+    let heating_s = heating_s.max(HEATING_S[0]);
     let squares = dictionary.at_grid(|r, i, k| {
         let problem = dictionary.problem;
         let torque = problem.pairs[r].real.torque.as_ref().map_or(problem.loads[r][k].motor[j], |torque| torque[j][i]);

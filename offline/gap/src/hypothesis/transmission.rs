@@ -114,6 +114,8 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
 
 /// Load behind a first-order lag.
 fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: bool) -> Vec<f64> {
+    // Faster creep is stretch.
+    let time_s = time_s.max(0.5 * CREEP_S[0]);
     let mut state = 0.0;
     dictionary
         .grid
