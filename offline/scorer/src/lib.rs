@@ -1,0 +1,1 @@
+//! Opens sealed truths and scores reports.
