@@ -8,8 +8,9 @@ use nalgebra::{Rotation3, Vector3};
 /// What an effect does to the plant.
 #[derive(Clone, Debug)]
 pub enum Act {
-    /// More friction; at the link instead of the motor; growing with load; varying with position (amplitude, period, phase).
-    Brake { at_link: bool, brake: Brake, load: f64, wave: [f64; 3] },
+    /// More friction; at the link instead of the motor; growing with load; varying with position (amplitude, period, phase,
+    /// mean).
+    Brake { at_link: bool, brake: Brake, load: f64, wave: [f64; 4] },
     /// Dry friction of the drive fades with heat: share lost, seconds, torque in N m (motor) that heats one second per second.
     Fade { share: f64, time: f64, reference: f64 },
     /// Series compliance, rad/(N m) or m/N.
@@ -56,6 +57,9 @@ pub enum Act {
     Missed { counts: f64, times: [f64; 3] },
 }
 
+/// Friction that is the same everywhere.
+const NO_WAVE: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
+
 /// An effect with its place, its weight at the present time and its memory.
 #[derive(Clone, Debug)]
 pub struct Acting {
@@ -75,7 +79,7 @@ impl Acting {
     /// None for effects of sensors alone, which leave the plant as it is.
     pub fn new(effect: &Effect, arm: &Arm) -> Option<Self> {
         let v = |name: &str| effect.value(name);
-        let brake = |brake: Brake| Act::Brake { at_link: v("at_link") > 0.5, brake, load: v("mu_l"), wave: [0.0, 1.0, 0.0] };
+        let brake = |brake: Brake| Act::Brake { at_link: v("at_link") > 0.5, brake, load: v("mu_l"), wave: NO_WAVE };
         let act = match effect.physics.as_str() {
             "coulomb_friction" => brake(Brake { dry: v("f_c"), ..Brake::default() }),
             "viscous_friction" => brake(Brake { viscous: v("b"), ..Brake::default() }),
@@ -88,13 +92,13 @@ impl Acting {
                 at_link: false,
                 brake: Brake::default(),
                 load: 0.0,
-                wave: [v("amplitude"), v("period"), v("phase")],
+                wave: [v("amplitude"), v("period"), v("phase"), (v("amplitude") - v("spare")).max(0.0)],
             },
             "outside:drag" => Act::Brake {
                 at_link: true,
                 brake: Brake { drag: v("drag"), ..Brake::default() },
                 load: 0.0,
-                wave: [0.0, 1.0, 0.0],
+                wave: NO_WAVE,
             },
             "thermal_drift" if v("drift") == 0.0 => Act::Fade { share: v("kappa_T"), time: v("T"), reference: v("reference") },
             "thermal_drift" => Act::Drift { size: v("drift"), time: v("T"), reference: v("reference") },
@@ -129,7 +133,7 @@ impl Acting {
             },
             "external_contact" => Act::Push(Vector3::new(v("n_x"), v("n_y"), v("n_z")) * v("f_max")),
             "outside:gain_change" => Act::Gains(v("kp_factor"), v("kd_factor")),
-            "outside:missed_counts" => Act::Missed { counts: v("counts"), times: [v("t_1"), v("t_2"), v("t_3")] },
+            "outside:missed_counts" => Act::Missed { counts: v("counts").round(), times: [v("t_1"), v("t_2"), v("t_3")] },
             _ => return None,
         };
         Some(Self { joint: effect.index(), act, effect: effect.clone(), weight: 1.0, memory: 0.0 })

@@ -86,6 +86,8 @@ pub struct Drive {
     pub ki: f64,
     /// Largest commanded torque, N m at the motor.
     pub limit: f64,
+    /// Torque noise relative to that of RAVEN's motors.
+    pub noise: f64,
 }
 
 /// How dry friction is made continuous.

@@ -95,6 +95,9 @@ pub struct Sealed {
     /// Name of the joint in the URDF.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_name: Option<String>,
+    /// Joint at which its severity was measured, for channels that have joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shown_at: Option<String>,
     /// Unit of every parameter.
     pub units: BTreeMap<String, String>,
     /// Channel in which its severity was measured.
@@ -157,7 +160,8 @@ impl Order {
     fn pair(&self) -> Pair {
         let mut random = self.random("robot");
         match self.robot {
-            Kind::Raven | Kind::Variant => robots::raven(&mut random),
+            Kind::Raven => robots::raven(&mut random),
+            Kind::Variant => robots::variant(&mut random),
         }
     }
 
@@ -225,7 +229,7 @@ impl Order {
         let (folder, part) = (out.join("cases").join(id), out.join("cases").join(format!(".{id}.part")));
         std::fs::create_dir_all(&part).map_err(trouble)?;
         for (name, bytes) in &case.files {
-            std::fs::write(part.join(name), bytes).map_err(trouble)?;
+            seal::write_undated(&part.join(name), bytes).map_err(trouble)?;
         }
         let sealed = out.join("sealed");
         std::fs::create_dir_all(&sealed).map_err(trouble)?;
@@ -246,11 +250,31 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
+    /// The effect at its size, at the first joint of a drawn order where that size can be reached.
     fn fit(&self, wanted: &Wanted, null: &Signals, clean: &Signals, random: &mut Random) -> Result<Sealed, String> {
-        let joint = wanted.joint.map_or_else(|| self.joint_for(&wanted.physics, random), |joint| joint - 1);
-        if joint >= self.scene.arm.size() {
-            return Err(format!("joint {} of an arm with {}", joint + 1, self.scene.arm.size()));
+        let size = self.scene.arm.size();
+        if let Some(joint) = wanted.joint {
+            if !(1..=size).contains(&joint) {
+                return Err(format!("joint {joint} of an arm with {size}"));
+            }
+            return self.fit_at(joint - 1, wanted, null, clean, random);
         }
+        let mut best: Option<Sealed> = None;
+        for joint in self.joints_for(&wanted.physics, random) {
+            let sealed = self.fit_at(joint, wanted, null, clean, random)?;
+            let reached = sealed.severity >= 0.8 * wanted.severity.unwrap_or(0.0);
+            if reached || best.as_ref().is_none_or(|best| sealed.severity > best.severity) {
+                best = Some(sealed);
+            }
+            if reached {
+                break;
+            }
+        }
+        best.ok_or_else(|| "an arm without joints".into())
+    }
+
+    fn fit_at(&self, joint: usize, wanted: &Wanted, null: &Signals, clean: &Signals, random: &mut Random) -> Result<Sealed, String> {
+        let arm = self.scene.arm;
         let mut draft = draw(&wanted.physics, joint, &self.scene, random).ok_or_else(|| format!("no physics `{}`", wanted.physics))?;
         draft.effect.interval = wanted.interval.or(draft.effect.interval);
         if wanted.onset && draft.effect.interval.is_none() {
@@ -262,10 +286,10 @@ impl Bench<'_> {
         }
         let measure = |effect: &Effect| {
             let effects = std::slice::from_ref(effect);
-            let with = record(&play(&self.exact, effects, self.trajectory), self.scene.arm, effects, None);
-            ratio(&with, clean, null, clean, self.scene.arm, &draft.place)
+            let with = record(&play(&self.exact, effects, self.trajectory), arm, effects, None);
+            ratio(&with, clean, null, clean, arm, &draft.place)
         };
-        let (effect, (severity, _)) = if wanted.parameters.is_empty() {
+        let (effect, (severity, shown_at)) = if wanted.parameters.is_empty() && wanted.details.is_empty() {
             search(&draft, wanted.severity.unwrap_or(1.0), &measure)
         } else {
             let mut effect = draft.sized(1.0);
@@ -274,9 +298,10 @@ impl Bench<'_> {
             let reached = measure(&effect);
             (effect, reached)
         };
-        let arm = self.scene.arm;
+        let joint_name = |joint: usize| arm.joints[joint].name.clone();
         Ok(Sealed {
-            joint_name: effect.joint.map(|joint| arm.joints[joint - 1].name.clone()),
+            joint_name: effect.joint.map(|joint| joint_name(joint - 1)),
+            shown_at: matches!(draft.place.channel, Channel::JointTorque | Channel::Transmission).then(|| joint_name(shown_at)),
             units: crate::units::of(&effect, arm),
             channel: draft.place.channel,
             severity_wanted: wanted.severity,
@@ -285,15 +310,18 @@ impl Bench<'_> {
         })
     }
 
-    /// A joint where the physics can show: play needs a load that changes sign.
-    fn joint_for(&self, physics: &str, random: &mut Random) -> usize {
-        let size = self.scene.arm.size();
-        if physics == "backlash" {
-            let crossed: Vec<usize> = (0..size).filter(|&j| self.scene.crossing(j) > 0.1).collect();
-            let best = (0..size).max_by(|&a, &b| self.scene.crossing(a).total_cmp(&self.scene.crossing(b))).unwrap_or(0);
-            return if crossed.is_empty() { best } else { crossed[random.index(crossed.len())] };
+    /// Joints to try, in random order; play needs a load that changes sign.
+    fn joints_for(&self, physics: &str, random: &mut Random) -> Vec<usize> {
+        let mut joints: Vec<usize> = (0..self.scene.arm.size()).collect();
+        for last in (1..joints.len()).rev() {
+            joints.swap(last, random.index(last + 1));
         }
-        random.index(size)
+        if physics == "backlash" {
+            let crossing = |j: usize| self.scene.crossing(j).min(0.1);
+            joints.sort_by(|&a, &b| crossing(b).total_cmp(&crossing(a)));
+            joints.truncate(1 + joints.iter().skip(1).filter(|&&j| crossing(j) >= 0.1).count());
+        }
+        joints
     }
 }
 

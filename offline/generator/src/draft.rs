@@ -1,6 +1,7 @@
 //! Draws an effect: where, its shape, and the parameters that grow with its size.
 
 use crate::arm::{Arm, Motion};
+use crate::draft_more;
 use crate::effect::Effect;
 use crate::random::Random;
 use crate::run::Signals;
@@ -63,24 +64,24 @@ pub struct Scene<'a> {
 
 impl Scene<'_> {
     /// Values of one joint's signal over all runs.
-    fn over<'s>(&'s self, signal: impl Fn(&'s Signals, usize) -> f64 + 's) -> impl Iterator<Item = f64> + 's {
+    pub(crate) fn over<'s>(&'s self, signal: impl Fn(&'s Signals, usize) -> f64 + 's) -> impl Iterator<Item = f64> + 's {
         let lead = Signals::lead();
         let of_run = move |run: &'s Signals| (lead..run.tip.len()).map(move |k| (run, k));
         self.runs.iter().flat_map(of_run).map(move |(run, k)| signal(run, k))
     }
 
-    fn rms<'s>(&'s self, signal: impl Fn(&'s Signals, usize) -> f64 + 's) -> f64 {
+    pub(crate) fn rms<'s>(&'s self, signal: impl Fn(&'s Signals, usize) -> f64 + 's) -> f64 {
         let (count, sum) = self.over(signal).fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value * value));
         f64::sqrt(sum / f64::max(count, 1.0))
     }
 
     /// RMS load of a cable, N m or N.
-    fn load(&self, j: usize) -> f64 {
+    pub(crate) fn load(&self, j: usize) -> f64 {
         self.rms(|run, k| run.load[k][j])
     }
 
     /// RMS speed of a joint, rad/s or m/s.
-    fn speed(&self, j: usize) -> f64 {
+    pub(crate) fn speed(&self, j: usize) -> f64 {
         self.rms(|run, k| run.motor_speed[k][j]) / self.arm.drives[j].ratio
     }
 
@@ -96,21 +97,21 @@ impl Scene<'_> {
     }
 
     /// Torque noise with the encoders' rattle, joint side.
-    fn torque_noise(&self, j: usize) -> f64 {
-        1.7 * self.noise.torque_nm * self.arm.drives[j].ratio
+    pub(crate) fn torque_noise(&self, j: usize) -> f64 {
+        1.7 * self.noise.torque_nm * self.arm.drives[j].noise * self.arm.drives[j].ratio
     }
 
     /// Joint encoder noise.
-    fn joint_noise(&self, j: usize) -> f64 {
+    pub(crate) fn joint_noise(&self, j: usize) -> f64 {
         self.noise.joint(self.arm.joints[j].motion)
     }
 }
 
-fn times(name: &'static str, base: f64) -> (&'static str, bool, Growth) {
+pub(crate) fn times(name: &'static str, base: f64) -> (&'static str, bool, Growth) {
     (name, true, Growth::Times(base))
 }
 
-fn place(channel: Channel, joint: Option<usize>) -> Place {
+pub(crate) fn place(channel: Channel, joint: Option<usize>) -> Place {
     Place { channel, joint, signal: None }
 }
 
@@ -119,10 +120,11 @@ pub fn draw(physics: &str, j: usize, scene: &Scene, random: &mut Random) -> Opti
     friction(physics, j, scene, random)
         .or_else(|| transmission(physics, j, scene, random))
         .or_else(|| bodies(physics, j, scene, random))
-        .or_else(|| crate::draft_more::rest(physics, j, scene, random))
+        .or_else(|| draft_more::vocabulary(physics, j, scene, random))
+        .or_else(|| draft_more::outside(physics, j, scene, random))
 }
 
-fn draft(mut effect: Effect, growing: Vec<(&'static str, bool, Growth)>, largest: f64, place: Place, extra: &[(&str, f64)]) -> Draft {
+pub(crate) fn draft(mut effect: Effect, growing: Vec<(&'static str, bool, Growth)>, largest: f64, place: Place, extra: &[(&str, f64)]) -> Draft {
     effect.details.extend(extra.iter().map(|(name, value)| ((*name).to_owned(), *value)));
     Draft { effect, growing, largest, place }
 }
@@ -130,8 +132,8 @@ fn draft(mut effect: Effect, growing: Vec<(&'static str, bool, Growth)>, largest
 fn friction(physics: &str, j: usize, scene: &Scene, random: &mut Random) -> Option<Draft> {
     let at = |parameters: &[(&str, f64)]| Effect::at(physics, Some(j + 1), parameters);
     let noise = scene.torque_noise(j);
-    // 0.06 N m at the motor shaft, five times its nominal dry friction
-    let largest = 0.06 * scene.arm.drives[j].ratio / noise;
+    // five times the dry friction that the drive has
+    let largest = 5.0 * scene.arm.drives[j].dry * scene.arm.drives[j].ratio / noise;
     let torque = place(Channel::JointTorque, Some(j));
     // most cable friction is met before the cable stretches; some after
     let at_link = f64::from(random.chance(0.2));
@@ -153,6 +155,15 @@ fn friction(physics: &str, j: usize, scene: &Scene, random: &mut Random) -> Opti
             let time = random.log_uniform(6.0, 60.0);
             let reference = scene.rms(|run, k| run.torque[k][j]);
             let warm = 1.0 - f64::exp(-6.0 / time);
+            if random.chance(0.25) {
+                // the same shape in position
+                let joint_noise = scene.joint_noise(j);
+                let base = joint_noise / warm * random.sign();
+                let shown = place(Channel::Transmission, Some(j));
+                let growing = vec![("drift", false, Growth::Times(base))];
+                let largest = warm * if scene.arm.joints[j].motion == Motion::Turns { 0.02 } else { 0.003 } / joint_noise;
+                return Some(draft(at(&[("T", time)]), growing, largest, shown, &[("reference", reference)]));
+            }
             let level = scene.arm.drives[j].dry * scene.arm.drives[j].ratio * warm;
             let sign = if random.chance(0.7) { 1.0 } else { -1.0 };
             let growing = vec![times("kappa_T", sign * noise / level)];

@@ -55,7 +55,7 @@ impl Contact {
     /// Signed share of the dry level, in about [-1, 1].
     pub fn sign(&self, v: f64) -> f64 {
         match self.law {
-            DryLaw::Smooth(_) => v / v.hypot(self.scale),
+            DryLaw::Smooth(_) => v / (v * v + self.scale * self.scale).sqrt(),
             DryLaw::Bristle(_) => self.bend + REST * (v - v.abs() * self.bend) / self.scale,
         }
     }
@@ -64,7 +64,7 @@ impl Contact {
     pub fn slope(&self, v: f64) -> f64 {
         match self.law {
             DryLaw::Smooth(_) => {
-                let h = v.hypot(self.scale);
+                let h = (v * v + self.scale * self.scale).sqrt();
                 self.scale * self.scale / (h * h * h)
             }
             DryLaw::Bristle(_) => (REST * (1.0 - v.signum() * self.bend) / self.scale).max(0.0),

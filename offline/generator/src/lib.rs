@@ -30,3 +30,4 @@ pub mod table;
 pub mod trajectory;
 pub mod units;
 pub mod urdf;
+pub mod variants;

@@ -42,7 +42,7 @@ fn parse(mut words: impl Iterator<Item = String>) -> Result<Arguments, String> {
     let out = given.get("out").map(PathBuf::from).ok_or(USAGE)?;
     let jobs = number("jobs", std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64))? as usize;
     let mut orders = match (given.get("matrix").map(String::as_str), given.get("case")) {
-        (Some("dev"), None) => matrix::dev(seed),
+        (Some(name), None) => matrix::named(name, seed).ok_or_else(|| format!("--matrix {name}: small, full or dev"))?,
         (None, Some(text)) => vec![serde_json::from_str(text).map_err(|error| format!("--case: {error}"))?],
         _ => return Err(USAGE.into()),
     };

@@ -113,7 +113,7 @@ impl<const N: usize> Plant<N> {
                 }
                 Act::Geometry { twist, length } => {
                     let tip = about(&Vector3::x(), twist * weight) * Vector3::from(arm.tip);
-                    arm.tip = [tip.x, tip.y, tip.z - length * weight];
+                    arm.tip = (tip * (1.0 + length * weight / tip.norm())).into();
                 }
                 _ => {}
             }
@@ -146,7 +146,7 @@ impl<const N: usize> Plant<N> {
             match &acting.act {
                 Act::Brake { at_link, brake, load, wave } => {
                     let into = if *at_link { &mut link_brake[j] } else { &mut motor_brake[j] };
-                    let hill = wave[0] * (1.0 + (TAU * u / wave[1] + wave[2]).sin());
+                    let hill = wave[3] + wave[0] * (TAU * u / wave[1] + wave[2]).sin();
                     into.dry += w * (brake.dry + load * self.load[j].abs() + hill);
                     into.viscous += w * brake.viscous;
                     into.drag += w * brake.drag;

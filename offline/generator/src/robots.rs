@@ -34,6 +34,7 @@ fn raven_model() -> Arm {
         kd: 0.02 * kp,
         ki: 0.0,
         limit: 0.6,
+        noise: 1.0,
     };
     let z = [0.0, 0.0, 1.0];
     Arm {
@@ -92,5 +93,11 @@ fn deviate(model: &Arm, random: &mut Random) -> Arm {
 /// The RAVEN-like arm; masses and drives drawn around those of the model.
 pub fn raven(random: &mut Random) -> Pair {
     let model = raven_model();
+    Pair { truth: deviate(&model, random), model }
+}
+
+/// Any other arm.
+pub fn variant(random: &mut Random) -> Pair {
+    let model = crate::variants::draw(random);
     Pair { truth: deviate(&model, random), model }
 }

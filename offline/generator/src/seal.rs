@@ -4,8 +4,9 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 /// JSON with sorted keys and no space: equal values have equal bytes.
 pub fn canonical(value: &impl Serialize) -> String {
@@ -55,6 +56,13 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let part = path.with_file_name(name);
     std::fs::write(&part, bytes)?;
     std::fs::rename(&part, path)
+}
+
+/// Writes a file whose time says nothing: a null case is made sooner than one whose effect had to be sized.
+pub fn write_undated(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = std::fs::File::create(path)?;
+    file.write_all(bytes)?;
+    file.set_modified(SystemTime::UNIX_EPOCH + Duration::from_hours(24 * 365))
 }
 
 /// Hash of every sealed truth in a folder, by case.

@@ -105,7 +105,7 @@ fn add_noise(seen: &mut Signals, arm: &Arm, noise: &Noise, random: &mut Random) 
     for k in 0..seen.tip.len() {
         for (j, joint) in arm.joints.iter().enumerate() {
             seen.joint[k][j] += noise.joint(joint.motion) * random.normal();
-            seen.torque[k][j] += noise.torque_nm * random.normal();
+            seen.torque[k][j] += noise.torque_nm * arm.drives[j].noise * random.normal();
         }
         for x in &mut seen.tip[k] {
             *x += noise.tip_m * random.normal();
