@@ -94,12 +94,9 @@ impl Acting {
                 load: 0.0,
                 wave: [v("amplitude"), v("period"), v("phase"), (v("amplitude") - v("spare")).max(0.0)],
             },
-            "outside:drag" => Act::Brake {
-                at_link: true,
-                brake: Brake { drag: v("drag"), ..Brake::default() },
-                load: 0.0,
-                wave: NO_WAVE,
-            },
+            "outside:drag" => {
+                Act::Brake { at_link: true, brake: Brake { drag: v("drag"), ..Brake::default() }, load: 0.0, wave: NO_WAVE }
+            }
             "thermal_drift" if v("drift") == 0.0 => Act::Fade { share: v("kappa_T"), time: v("T"), reference: v("reference") },
             "thermal_drift" => Act::Drift { size: v("drift"), time: v("T"), reference: v("reference") },
             "cable_stretch" => Act::Compliance(1.0 / v("k")),

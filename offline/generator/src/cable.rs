@@ -2,36 +2,36 @@
 
 /// A cable between motor and joint, in joint units. Everything but stiffness and damping is set anew each step.
 #[derive(Clone, Copy, Debug)]
-pub struct Cable {
+pub(crate) struct Cable {
     stiffness: f64,
     damping: f64,
     /// Missing series compliance, rad/(N m) or m/N.
-    pub compliance: f64,
+    pub(crate) compliance: f64,
     /// Full width of play, rad or m.
-    pub play: f64,
+    pub(crate) play: f64,
     /// Cubic stiffness, N m/rad^3 or N/m^3.
-    pub cubic: f64,
+    pub(crate) cubic: f64,
     /// Share and pretension stretch (rad or m) of an antagonist pair that can go slack.
-    pub slack: Option<(f64, f64)>,
+    pub(crate) slack: Option<(f64, f64)>,
     /// Bouc-Wen: share that yields, yield deflection, its state.
-    pub soft: (f64, f64, f64),
+    pub(crate) soft: (f64, f64, f64),
     /// Creep so far, rad or m.
-    pub sag: f64,
+    pub(crate) sag: f64,
 }
 
 impl Cable {
     /// Without defects.
-    pub fn new(stiffness: f64, damping: f64) -> Self {
+    pub(crate) fn new(stiffness: f64, damping: f64) -> Self {
         Self { stiffness, damping, compliance: 0.0, play: 0.0, cubic: 0.0, slack: None, soft: (0.0, 1.0, 0.0), sag: 0.0 }
     }
 
     /// Back to no defects.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self::new(self.stiffness, self.damping);
     }
 
     /// Force from deflection (motor ahead of joint) and its rate.
-    pub fn force(&self, deflection: f64, rate: f64) -> f64 {
+    pub(crate) fn force(&self, deflection: f64, rate: f64) -> f64 {
         let total = deflection - self.sag;
         let half = 0.5 * self.play;
         let stretch = if total > half {

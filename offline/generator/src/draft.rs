@@ -92,7 +92,8 @@ impl Scene<'_> {
 
     /// Share of the time in which the cable pulls the rarer way.
     pub fn crossing(&self, j: usize) -> f64 {
-        let (count, positive) = self.over(|run, k| run.load[k][j]).fold((0.0, 0.0), |(n, p), load| (n + 1.0, p + f64::from(load > 0.0)));
+        let (count, positive) =
+            self.over(|run, k| run.load[k][j]).fold((0.0, 0.0), |(n, p), load| (n + 1.0, p + f64::from(load > 0.0)));
         f64::min(positive / count, 1.0 - positive / count)
     }
 
@@ -124,7 +125,13 @@ pub fn draw(physics: &str, j: usize, scene: &Scene, random: &mut Random) -> Opti
         .or_else(|| draft_more::outside(physics, j, scene, random))
 }
 
-pub(crate) fn draft(mut effect: Effect, growing: Vec<(&'static str, bool, Growth)>, largest: f64, place: Place, extra: &[(&str, f64)]) -> Draft {
+pub(crate) fn draft(
+    mut effect: Effect,
+    growing: Vec<(&'static str, bool, Growth)>,
+    largest: f64,
+    place: Place,
+    extra: &[(&str, f64)],
+) -> Draft {
     effect.details.extend(extra.iter().map(|(name, value)| ((*name).to_owned(), *value)));
     Draft { effect, growing, largest, place }
 }

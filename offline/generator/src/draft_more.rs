@@ -27,7 +27,11 @@ pub(crate) fn vocabulary(physics: &str, j: usize, scene: &Scene, random: &mut Ra
             draft(shape, vec![times("amp", 1.4 * noise)], 3.0 * scene.arm.drives[j].dry * ratio / noise, torque, &[])
         }
         "link_geometry" => {
-            let growing = if random.chance(0.5) { times("d_alpha", 1.5e-3 * random.sign()) } else { times("d_length", 0.45e-3 * random.sign()) };
+            let growing = if random.chance(0.5) {
+                times("d_alpha", 1.5e-3 * random.sign())
+            } else {
+                times("d_length", 0.45e-3 * random.sign())
+            };
             draft(at(&[]), vec![growing], 40.0, place(Channel::EndEffector, None), &[])
         }
         "frame_misalignment" => {
@@ -114,15 +118,19 @@ pub(crate) fn outside(physics: &str, j: usize, scene: &Scene, random: &mut Rando
             let (period, phase) = (joint.reach * random.uniform(0.5, 1.1), random.uniform(0.0, TAU));
             let growing = vec![detail("amplitude", Growth::Times(1.4 * noise))];
             let spare = 0.8 * drive.dry * drive.ratio;
-            draft(at(), growing, 5.0 * drive.dry * drive.ratio / noise, torque, &[("period", period), ("phase", phase), ("spare", spare)])
+            draft(
+                at(),
+                growing,
+                5.0 * drive.dry * drive.ratio / noise,
+                torque,
+                &[("period", period), ("phase", phase), ("spare", spare)],
+            )
         }
         "outside:drag" => {
             let base = noise / scene.rms(|run, k| (run.motor_speed[k][j] / drive.ratio).powi(2));
             draft(at(), vec![detail("drag", Growth::Times(base))], 5.0 * drive.dry * drive.ratio / noise, torque, &[])
         }
-        "outside:cable_slack" => {
-            draft(at(), vec![detail("pretension", Growth::Over(0.8 * stretch))], 1e3, shown, &[])
-        }
+        "outside:cable_slack" => draft(at(), vec![detail("pretension", Growth::Over(0.8 * stretch))], 1e3, shown, &[]),
         "outside:missed_counts" => {
             let seconds = (scene.runs[0].count() as f64) / crate::controller::RATE;
             let mut time = |low: f64| random.uniform(low, low + 0.25) * seconds;

@@ -43,7 +43,11 @@ pub struct Frames<const N: usize> {
 }
 
 impl<const N: usize> Chain<N> {
-    /// The chain of an arm; the caller has matched `N` to its joints.
+    /// The chain of an arm.
+    ///
+    /// # Panics
+    ///
+    /// Unless the arm has `N` joints.
     pub fn new(arm: &Arm) -> Self {
         assert_eq!(arm.size(), N);
         Self {
@@ -74,7 +78,8 @@ impl<const N: usize> Chain<N> {
 
     /// Where every joint is.
     pub fn frames(&self, q: &[f64; N]) -> Frames<N> {
-        let mut frames = Frames { axis: [V::zeros(); N], origin: [V::zeros(); N], turn: [Matrix3::identity(); N], place: [V::zeros(); N] };
+        let mut frames =
+            Frames { axis: [V::zeros(); N], origin: [V::zeros(); N], turn: [Matrix3::identity(); N], place: [V::zeros(); N] };
         let (mut turn, mut at) = (Matrix3::identity(), V::zeros());
         for j in 0..N {
             at += turn * self.origin[j];

@@ -8,10 +8,13 @@
 // sums over joints and links read best with the indices of the formulas
 #![allow(clippy::needless_range_loop)]
 
-pub mod acting;
+pub(crate) mod acting;
 pub mod arm;
-pub mod cable;
+pub mod batch;
+mod bench;
+pub(crate) mod cable;
 pub mod case;
+pub(crate) mod cholesky;
 pub mod controller;
 pub mod draft;
 mod draft_more;
@@ -19,6 +22,7 @@ pub mod effect;
 pub mod friction;
 pub mod lagrange;
 pub mod matrix;
+pub mod order;
 pub mod plant;
 pub mod random;
 pub mod robots;
@@ -28,6 +32,6 @@ pub mod sensors;
 pub mod severity;
 pub mod table;
 pub mod trajectory;
-pub mod units;
-pub mod urdf;
-pub mod variants;
+pub(crate) mod units;
+pub(crate) mod urdf;
+pub(crate) mod variants;

@@ -1,14 +1,13 @@
 //! `ravenpose-generate`: recordings with a concealed cause.
 
-use generator::case::Order;
-use generator::{matrix, seal};
+use generator::order::Order;
+use generator::{batch, matrix};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-const USAGE: &str = "usage: ravenpose-generate (--matrix small|full|dev | --case JSON) --out DIR [--seed N] [--only BLOCK] [--jobs N]";
+const USAGE: &str =
+    "usage: ravenpose-generate (--matrix small|full|dev | --case JSON) --out DIR [--seed N] [--only BLOCK] [--jobs N]";
 
 struct Arguments {
     orders: Vec<Order>,
@@ -17,7 +16,9 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match parse(std::env::args().skip(1)).and_then(|arguments| generate(&arguments)) {
+    match parse(std::env::args().skip(1))
+        .and_then(|given| batch::make(&given.orders, &given.out, given.jobs).map(|()| given.orders.len()))
+    {
         Ok(count) => {
             println!("{count} cases");
             ExitCode::SUCCESS
@@ -37,7 +38,9 @@ fn parse(mut words: impl Iterator<Item = String>) -> Result<Arguments, String> {
         let value = words.next().ok_or_else(|| format!("--{name} wants a value; {USAGE}"))?;
         given.insert(name.to_owned(), value);
     }
-    let number = |name: &str, default: u64| given.get(name).map_or(Ok(default), |text| text.parse().map_err(|_| format!("--{name} {text}: not a number")));
+    let number = |name: &str, default: u64| {
+        given.get(name).map_or(Ok(default), |text| text.parse().map_err(|_| format!("--{name} {text}: not a number")))
+    };
     let seed = number("seed", 1)?;
     let out = given.get("out").map(PathBuf::from).ok_or(USAGE)?;
     let jobs = number("jobs", std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64))? as usize;
@@ -53,43 +56,4 @@ fn parse(mut words: impl Iterator<Item = String>) -> Result<Arguments, String> {
         return Err("no case has this block".into());
     }
     Ok(Arguments { orders, out, jobs: jobs.max(1) })
-}
-
-fn generate(arguments: &Arguments) -> Result<usize, String> {
-    let Arguments { orders, out, jobs } = arguments;
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    let (next, troubles) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..*jobs {
-            scope.spawn(|| {
-                while let Some(order) = orders.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if order.is_done(out) {
-                        continue;
-                    }
-                    if let Err(trouble) = order.write(out)
-                        && let Ok(mut troubles) = troubles.lock()
-                    {
-                        troubles.push(format!("{}: {trouble}", order.label));
-                    }
-                }
-            });
-        }
-    });
-    if let Some(first) = troubles.into_inner().unwrap_or_default().first() {
-        return Err(first.clone());
-    }
-    manifest(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    Ok(orders.len())
-}
-
-/// The public list of hashes.
-fn manifest(out: &Path) -> std::io::Result<()> {
-    let cases = seal::commitments(&out.join("sealed"))?;
-    let manifest = serde_json::json!({
-        "schema": "ravenpose-truth-manifest-1",
-        "generator": concat!("ravenpose-generator ", env!("CARGO_PKG_VERSION")),
-        "hash": "SHA-256 of the canonical JSON of each sealed truth",
-        "cases": cases,
-    });
-    seal::write_whole(&out.join("manifest.json"), (seal::canonical(&manifest) + "\n").as_bytes())
 }

@@ -1,7 +1,7 @@
 //! The sets of cases: `small` for every change, `full` for a release, `dev` to tune with. Labels hold the name of the set, so no
 //! two sets share a trajectory or a parameter even at the same seed.
 
-use crate::case::{Kind, Order, Wanted};
+use crate::order::{Kind, Order, Wanted};
 use crate::random::Random;
 use crate::trajectory::Excitation;
 

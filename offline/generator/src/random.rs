@@ -81,7 +81,7 @@ impl Random {
 
     /// `bytes` random bytes in hexadecimal.
     pub fn hex(&mut self, bytes: usize) -> String {
-        (0..bytes).map(|_| format!("{:02x}", self.bits() as u8)).collect()
+        (0..bytes).fold(String::new(), |text, _| text + &format!("{:02x}", self.bits() as u8))
     }
 }
 

@@ -21,6 +21,7 @@ fn link(name: &str, mass: f64, centre: [f64; 3], inertia: [f64; 3]) -> Link {
     Link { name: name.into(), mass, centre: centre.into(), inertia: Matrix3::from_diagonal(&Vector3::from(inertia)) }
 }
 
+#[expect(clippy::approx_constant, reason = "the file has four decimals")]
 /// The arm of data/gap-examples/robot.urdf; drives of that plant, as fitted on its noise-free simulations.
 fn raven_model() -> Arm {
     let drive = |ratio: f64, dry: f64, stiffness: f64, damping: f64, kp: f64| Drive {
@@ -82,11 +83,8 @@ fn deviate(model: &Arm, random: &mut Random) -> Arm {
             drive.ki = share * drive.kp;
         }
     }
-    truth.dry_law = if random.chance(0.75) {
-        DryLaw::Smooth(random.uniform(0.35, 0.7))
-    } else {
-        DryLaw::Bristle(random.uniform(0.05, 0.12))
-    };
+    truth.dry_law =
+        if random.chance(0.75) { DryLaw::Smooth(random.uniform(0.35, 0.7)) } else { DryLaw::Bristle(random.uniform(0.05, 0.12)) };
     truth
 }
 

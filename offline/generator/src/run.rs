@@ -109,4 +109,3 @@ fn play_sized<const N: usize>(robot: &Robot, effects: &[Effect], trajectory: &Tr
     }
     out
 }
-

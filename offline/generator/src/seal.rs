@@ -46,10 +46,14 @@ fn write(value: &Value, out: &mut String) {
 
 /// SHA-256 in hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(bytes).iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// Writes a file under a temporary name and renames it.
+///
+/// # Errors
+///
+/// Those of the disk.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".part");
@@ -59,6 +63,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Writes a file whose time says nothing: a null case is made sooner than one whose effect had to be sized.
+///
+/// # Errors
+///
+/// Those of the disk.
 pub fn write_undated(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = std::fs::File::create(path)?;
     file.write_all(bytes)?;
@@ -66,6 +74,10 @@ pub fn write_undated(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Hash of every sealed truth in a folder, by case.
+///
+/// # Errors
+///
+/// Those of the disk.
 pub fn commitments(sealed: &Path) -> io::Result<BTreeMap<String, String>> {
     let mut hashes = BTreeMap::new();
     for entry in std::fs::read_dir(sealed)? {

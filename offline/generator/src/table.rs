@@ -4,12 +4,17 @@ use crate::arm::Arm;
 use crate::controller::RATE;
 use crate::run::Signals;
 use flate2::{Compression, GzBuilder};
-use std::io::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 
 /// Samples between two frames of the tip in a recording.
 pub const FRAME: usize = 20;
 
 /// The bytes of a `.csv.gz`. `recording`: the tip comes at 50 Hz; otherwise at every sample, as a simulator has it.
+///
+/// # Errors
+///
+/// Those of the compressor.
 pub fn csv_gz(signals: &Signals, arm: &Arm, recording: bool) -> std::io::Result<Vec<u8>> {
     let text = csv(signals, arm, recording);
     let mut gz = GzBuilder::new().mtime(0).write(Vec::new(), Compression::new(3));
@@ -20,11 +25,11 @@ pub fn csv_gz(signals: &Signals, arm: &Arm, recording: bool) -> std::io::Result<
 fn csv(signals: &Signals, arm: &Arm, recording: bool) -> String {
     let samples = signals.tip.len();
     let mut text = String::with_capacity(samples * (60 + 70 * arm.size()));
-    text.push_str(&format!("# robot = {}\n# sample_hz = {RATE}\nt_s", arm.name));
+    let _ = write!(text, "# robot = {}\n# sample_hz = {RATE}\nt_s", arm.name);
     let joints: Vec<(usize, &str)> = arm.joints.iter().enumerate().map(|(j, joint)| (j + 1, joint.motion.unit())).collect();
     let mut name = |start: &str, end: &dyn Fn(&str) -> String| {
         for (j, unit) in &joints {
-            text.push_str(&format!(",{start}_{j}_{}", end(unit)));
+            let _ = write!(text, ",{start}_{j}_{}", end(unit));
         }
     };
     name("mpos", &|_| "rad".into());

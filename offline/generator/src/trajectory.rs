@@ -66,7 +66,14 @@ pub fn draw(arm: &Arm, seconds: f64, excitation: Excitation, random: &mut Random
     Trajectory { positions }
 }
 
-fn holds(reach: f64, first: f64, seconds: f64, excitation: Excitation, wave: &dyn Fn(f64) -> f64, random: &mut Random) -> Vec<Hold> {
+fn holds(
+    reach: f64,
+    first: f64,
+    seconds: f64,
+    excitation: Excitation,
+    wave: &dyn Fn(f64) -> f64,
+    random: &mut Random,
+) -> Vec<Hold> {
     let mut holds = Vec::new();
     let mut start = first;
     while start < seconds {

@@ -5,7 +5,7 @@ use crate::effect::Effect;
 use std::collections::BTreeMap;
 
 /// Unit of every parameter of an effect.
-pub fn of(effect: &Effect, arm: &Arm) -> BTreeMap<String, String> {
+pub(crate) fn of(effect: &Effect, arm: &Arm) -> BTreeMap<String, String> {
     let motion = arm.joints[effect.index()].motion;
     let (position, effort) = (motion.unit(), motion.effort());
     let unit = |name: &str| match name {

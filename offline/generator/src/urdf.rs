@@ -15,9 +15,10 @@ fn number(x: f64) -> String {
 }
 
 /// The text of `robot.urdf`.
-pub fn text(model: &Arm) -> String {
+pub(crate) fn text(model: &Arm) -> String {
     let mut out = String::from("<?xml version=\"1.0\"?>\n");
-    let _ = writeln!(out, "<!-- Kinematics exact, inertials approximate (what a lab would have). Gravity is along the world's -z. -->");
+    let _ =
+        writeln!(out, "<!-- Kinematics exact, inertials approximate (what a lab would have). Gravity is along the world's -z. -->");
     let _ = writeln!(out, "<robot name=\"{}\">\n  <link name=\"world\"/>", model.name);
     let mount = three(&model.mount);
     let _ = writeln!(

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 /// An arm as a laboratory describes it.
-pub fn draw(random: &mut Random) -> Arm {
+pub(crate) fn draw(random: &mut Random) -> Arm {
     let size = 2 + random.index(3);
     let sliding = if random.chance(0.5) { Some(random.index(size)) } else { None };
     let (mut joints, mut links) = (Vec::new(), Vec::new());

@@ -14,7 +14,9 @@ fn arm() -> Arm {
 fn postures() -> Vec<([f64; 3], [f64; 3])> {
     let mut random = Random::new(11, "postures");
     let mut draw = |low: f64, high: f64| random.uniform(low, high);
-    (0..20).map(|_| ([draw(0.1, 1.4), draw(0.6, 2.2), draw(-0.3, -0.1)], [draw(-2.0, 2.0), draw(-2.0, 2.0), draw(-0.4, 0.4)])).collect()
+    (0..20)
+        .map(|_| ([draw(0.1, 1.4), draw(0.6, 2.2), draw(-0.3, -0.1)], [draw(-2.0, 2.0), draw(-2.0, 2.0), draw(-0.4, 0.4)]))
+        .collect()
 }
 
 #[test]

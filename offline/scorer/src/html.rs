@@ -76,9 +76,9 @@ fn curve(score: &Score) -> String {
             bin.right.hits, bin.right.of
         );
     }
-    let _ = write!(
+    let _ = writeln!(
         out,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">stated probability</text><text x=\"12\" y=\"{:.1}\" transform=\"rotate(-90 12 {:.1})\" text-anchor=\"middle\">share that was right</text></svg>\n",
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">stated probability</text><text x=\"12\" y=\"{:.1}\" transform=\"rotate(-90 12 {:.1})\" text-anchor=\"middle\">share that was right</text></svg>",
         edge + size / 2.0,
         size + edge + 32.0,
         edge + size / 2.0,
@@ -89,7 +89,9 @@ fn curve(score: &Score) -> String {
 
 /// The confusion matrix, shaded by share of the row.
 fn names(score: &Score) -> String {
-    let mut out = String::from("<h2>Names given</h2>\n<p class=\"note\">Truth in rows, first name of the answer in columns; cases of at most one effect.</p>\n");
+    let mut out = String::from(
+        "<h2>Names given</h2>\n<p class=\"note\">Truth in rows, first name of the answer in columns; cases of at most one effect.</p>\n",
+    );
     out.push_str("<div class=\"wide\"><table class=\"names\"><tr><th></th>");
     for name in &score.confusion.names {
         let _ = write!(out, "<th class=\"up\">{}</th>", spoken(name));
@@ -106,6 +108,10 @@ fn names(score: &Score) -> String {
         }
         out.push_str("</tr>\n");
     }
-    let _ = writeln!(out, "</table></div>\n<p class=\"note\">{} cases have no column (no report, or a name outside the vocabulary).</p>", score.confusion.elsewhere);
+    let _ = writeln!(
+        out,
+        "</table></div>\n<p class=\"note\">{} cases have no column (no report, or a name outside the vocabulary).</p>",
+        score.confusion.elsewhere
+    );
     out
 }

@@ -87,7 +87,8 @@ pub fn judge(truth: &Truth, report: Option<&Report>) -> Judged {
         (_, Some(verdict)) => verdict.physics.as_str(),
         (_, None) => "none",
     };
-    let named: Vec<&Verdict> = primaries.iter().copied().filter(|verdict| !["none", "unmodelled"].contains(&verdict.physics.as_str())).collect();
+    let named: Vec<&Verdict> =
+        primaries.iter().copied().filter(|verdict| !["none", "unmodelled"].contains(&verdict.physics.as_str())).collect();
     let row = truth.row();
     // of a pair, the first verdict is held against the effect that it names
     let meant = truth.effects.iter().find(|effect| effect.physics == answer);
@@ -103,7 +104,11 @@ pub fn judge(truth: &Truth, report: Option<&Report>) -> Judged {
         noise: truth.noise,
         robot: truth.robot.clone(),
         dry_law: truth.dry_law.clone(),
-        truth: if truth.effects.len() < 2 { vec![row.to_owned()] } else { truth.effects.iter().map(|effect| effect.physics.clone()).collect() },
+        truth: if truth.effects.len() < 2 {
+            vec![row.to_owned()]
+        } else {
+            truth.effects.iter().map(|effect| effect.physics.clone()).collect()
+        },
         answer: answer.to_owned(),
         status: if report.is_some() { answered.status.clone() } else { "no report".into() },
         detected: answered.mismatch.detected,
@@ -196,7 +201,9 @@ fn claims(truth: &Truth, primaries: &[&Verdict]) -> Vec<Claim> {
     let right = |verdict: &Verdict| match verdict.physics.as_str() {
         "none" => truth.effects.is_empty(),
         "unmodelled" => truth.effects.iter().any(Effect::is_outside),
-        name => truth.effects.iter().any(|effect| effect.physics == name && joint_right(truth, effect, Some(verdict)) != Some(false)),
+        name => {
+            truth.effects.iter().any(|effect| effect.physics == name && joint_right(truth, effect, Some(verdict)) != Some(false))
+        }
     };
     primaries.iter().map(|verdict| Claim { probability: verdict.probability, right: right(verdict) }).collect()
 }

@@ -56,7 +56,8 @@ fn score(folder: &Path, out: &Path, answered_only: bool) -> Result<(), String> {
     let score = trial::trial(folder, answered_only)?;
     let json = serde_json::to_string_pretty(&score).map_err(|error| error.to_string())?;
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
-    for (name, text) in [("score.json", json + "\n"), ("score.html", html::page(&score)), ("score.md", markdown::markdown(&score))] {
+    for (name, text) in [("score.json", json + "\n"), ("score.html", html::page(&score)), ("score.md", markdown::markdown(&score))]
+    {
         let path = out.join(name);
         verify::write_whole(&path, text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
     }

@@ -44,7 +44,8 @@ fn words(words: &[&str]) -> Vec<String> {
 
 fn groups(title: &str, note: &str, groups: &[Group]) -> Table {
     let head = ["group", "cases", "mismatch seen", "joint right", "first name right", "and no other named", "name in the set"];
-    let more = ["names in the set", "parameter error, median", "90th", "interval holds the truth", "removed, median", "time overlap"];
+    let more =
+        ["names in the set", "parameter error, median", "90th", "interval holds the truth", "removed, median", "time overlap"];
     let row = |group: &Group| {
         let f: &Figures = &group.figures;
         let rates = [&f.detected, &f.joint, &f.top, &f.alone, &f.in_set].map(rate);
@@ -103,7 +104,9 @@ pub fn tables(score: &Score) -> Vec<Table> {
         rows: score
             .pairs
             .iter()
-            .map(|p| vec![p.level.to_string(), p.cases.to_string(), rate(&p.both), rate(&p.both_in_set), rate(&p.one), rate(&p.detected)])
+            .map(|p| {
+                vec![p.level.to_string(), p.cases.to_string(), rate(&p.both), rate(&p.both_in_set), rate(&p.one), rate(&p.detected)]
+            })
             .collect(),
     });
     tables.push(Table {
@@ -123,7 +126,9 @@ pub fn tables(score: &Score) -> Vec<Table> {
         rows: score
             .calibration
             .iter()
-            .map(|bin| vec![format!("{}-{} %", percent(bin.range[0]), percent(bin.range[1])), percent(bin.stated) + " %", rate(&bin.right)])
+            .map(|bin| {
+                vec![format!("{}-{} %", percent(bin.range[0]), percent(bin.range[1])), percent(bin.stated) + " %", rate(&bin.right)]
+            })
             .collect(),
     });
     tables.retain(|table| !table.rows.is_empty());
@@ -157,7 +162,10 @@ pub fn markdown(score: &Score) -> String {
             let _ = writeln!(out, "| {} |", row.join(" | "));
         }
     }
-    let _ = write!(out, "\n## Names given\n\nTruth in rows; where more than one in ten went to another name.\n\n| truth | cases | right | went to |\n| --- | --- | --- | --- |\n");
+    let _ = write!(
+        out,
+        "\n## Names given\n\nTruth in rows; where more than one in ten went to another name.\n\n| truth | cases | right | went to |\n| --- | --- | --- | --- |\n"
+    );
     for row in mistaken(score) {
         let _ = writeln!(out, "| {} |", row.join(" | "));
     }

@@ -9,6 +9,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Runs `tool gap` on every case of the manifest that has no report yet; returns how many reports stand.
+///
+/// # Errors
+///
+/// A folder without a manifest; cases that get no report are told on standard error only.
 pub fn run(folder: &Path, tool: &Path, jobs: usize) -> Result<usize, String> {
     let cases: Vec<String> = manifest(&folder.join("manifest.json"))?.into_keys().collect();
     let (next, troubles) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
@@ -53,7 +57,8 @@ fn answer(folder: &Path, tool: &Path, case: &str) -> Result<(), String> {
     words.push("--sim".into());
     words.extend(files(&data, "sim_")?.into_iter().map(OsString::from));
     words.extend(["--robot".into(), data.join("robot.urdf").into(), "--out".into(), out.into(), "--seed".into(), "1".into()]);
-    let done = Command::new(tool).args(words).stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| error.to_string())?;
+    let done =
+        Command::new(tool).args(words).stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| error.to_string())?;
     // 0 no mismatch, 1 mismatch, 2 trouble; a report may stand even then
     if report(folder, case).is_file() {
         return Ok(());
@@ -62,6 +67,10 @@ fn answer(folder: &Path, tool: &Path, case: &str) -> Result<(), String> {
 }
 
 /// Writes `reports/manifest.json` over the reports that stand; returns how many.
+///
+/// # Errors
+///
+/// A folder without a manifest, or trouble with the disk.
 pub fn publish(folder: &Path) -> Result<usize, String> {
     let cases = manifest(&folder.join("manifest.json"))?;
     let mut hashes = BTreeMap::new();

@@ -94,7 +94,7 @@ const LEVELS: [f64; 5] = [0.3, 1.0, 3.0, 10.0, 30.0];
 const OTHERS: [&str; 3] = ["null", "pairs", "outside"];
 
 /// Adds everything up.
-pub fn score(judged: Vec<Judged>, manifests: [String; 2]) -> Score {
+pub fn score(judged: Vec<Judged>, [truth_manifest_sha256, report_manifest_sha256]: [String; 2]) -> Score {
     let pick = |test: &dyn Fn(&Judged) -> bool| -> Vec<&Judged> { judged.iter().filter(|case| test(case)).collect() };
     let of_block = |block: &str, level: f64| pick(&|case| case.block == block && case.level == level);
     let is_single = |case: &Judged| case.block == "single";
@@ -132,7 +132,9 @@ pub fn score(judged: Vec<Judged>, manifests: [String; 2]) -> Score {
     }
 
     let nulls = [0.0, 1.0, 2.0, 4.0].map(|noise| {
-        let alarms = Rate::of(pick(&|case| case.truth == ["none"] && (noise == 0.0 || case.noise == noise)).iter().map(|case| case.detected));
+        let alarms = Rate::of(
+            pick(&|case| case.truth == ["none"] && (noise == 0.0 || case.noise == noise)).iter().map(|case| case.detected),
+        );
         Nulls { noise, alarms, upper95: clopper_upper(alarms.hits, alarms.of) }
     });
     let pairs = LEVELS.map(|level| Pairs::of(level, &of_block("pairs", level)));
@@ -148,8 +150,8 @@ pub fn score(judged: Vec<Judged>, manifests: [String; 2]) -> Score {
     Score {
         cases: judged.len(),
         without_report: judged.iter().filter(|case| case.status == "no report").count(),
-        truth_manifest_sha256: manifests[0].clone(),
-        report_manifest_sha256: manifests[1].clone(),
+        truth_manifest_sha256,
+        report_manifest_sha256,
         targets,
         blocks,
         physics,

@@ -9,6 +9,10 @@ use crate::verify::{data, manifest, read, sha256};
 use std::path::Path;
 
 /// Scores the folder of a trial. `answered_only`: cases without a report are left out instead of counted as failures.
+///
+/// # Errors
+///
+/// Anything that was changed after publication, is missing, or cannot be read.
 pub fn trial(folder: &Path, answered_only: bool) -> Result<Score, String> {
     let paths = [folder.join("manifest.json"), folder.join("reports").join("manifest.json")];
     let truths = read(&manifest(&paths[0])?, |case| folder.join("sealed").join(format!("{case}.json")), false)?;
@@ -28,6 +32,7 @@ pub fn trial(folder: &Path, answered_only: bool) -> Result<Score, String> {
             judged.push(judge(&truth, answer.as_ref()));
         }
     }
-    let hash = |path: &Path| std::fs::read(path).map(|bytes| sha256(&bytes)).map_err(|error| format!("{}: {error}", path.display()));
+    let hash =
+        |path: &Path| std::fs::read(path).map(|bytes| sha256(&bytes)).map_err(|error| format!("{}: {error}", path.display()));
     Ok(score(judged, [hash(&paths[0])?, hash(&paths[1])?]))
 }

@@ -9,10 +9,14 @@ pub type Bytes = BTreeMap<String, Vec<u8>>;
 
 /// SHA-256 in hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(bytes).iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// The hashes of a manifest: its `cases` object.
+///
+/// # Errors
+///
+/// A file that is not there or has no such object.
 pub fn manifest(path: &Path) -> Result<BTreeMap<String, String>, String> {
     let bytes = std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
     let value: serde_json::Value = serde_json::from_slice(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -20,6 +24,10 @@ pub fn manifest(path: &Path) -> Result<BTreeMap<String, String>, String> {
 }
 
 /// Reads the file of every case of a manifest and compares its hash. `missing_allowed`: a file that is not there is left out.
+///
+/// # Errors
+///
+/// The first file that is not what was published.
 pub fn read(hashes: &BTreeMap<String, String>, place: impl Fn(&str) -> PathBuf, missing_allowed: bool) -> Result<Bytes, String> {
     let mut all = Bytes::new();
     for (case, hash) in hashes {
@@ -37,6 +45,10 @@ pub fn read(hashes: &BTreeMap<String, String>, place: impl Fn(&str) -> PathBuf, 
 }
 
 /// Compares the files of one case with the hashes that its truth holds. A case that was thrown away after the run is no trouble.
+///
+/// # Errors
+///
+/// The first file that is not what was sealed.
 pub fn data(folder: &Path, files: &BTreeMap<String, String>) -> Result<(), String> {
     for (name, hash) in files {
         let path = folder.join(name);
@@ -49,6 +61,10 @@ pub fn data(folder: &Path, files: &BTreeMap<String, String>) -> Result<(), Strin
 }
 
 /// Writes a file under a temporary name and renames it.
+///
+/// # Errors
+///
+/// Those of the disk.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".part");

@@ -120,7 +120,10 @@ fn nulls_pairs_and_outside() {
     for k in 0..4 {
         let id = format!("null{k}");
         folder.seal(&id, &truth(&id, "null", &json!([])));
-        folder.answer(&id, &if k == 0 { report("unmodelled", &[verdict(1, "unmodelled", &[], 0.5, &json!([]), &[])]) } else { none() });
+        folder.answer(
+            &id,
+            &if k == 0 { report("unmodelled", &[verdict(1, "unmodelled", &[], 0.5, &json!([]), &[])]) } else { none() },
+        );
     }
     let payload = json!({"physics": "payload", "parameters": {"m_p": 0.1}, "severity_wanted": 1.0, "severity": 1.1});
     for id in ["both", "same", "second"] {
@@ -130,9 +133,21 @@ fn nulls_pairs_and_outside() {
     folder.answer("both", &report("explained", &[named(1, "payload"), named(2, "coulomb_friction")]));
     // two sets that hold one effect only: not both
     folder.answer("same", &report("explained", &[named(1, "payload"), named(2, "payload")]));
-    folder.answer("second", &report("explained", &[verdict(1, "viscous_friction", &[], 0.4, &json!([]), &[]), named(2, "coulomb_friction")]));
-    for (id, status, physics) in [("o1", "unmodelled", "unmodelled"), ("o2", "explained", "coulomb_friction"), ("o3", "no_mismatch", "none")] {
-        folder.seal(id, &truth(id, "outside", &json!([{"physics": "outside:drag", "joint": 2, "joint_name": "elbow", "severity_wanted": 3.0, "severity": 3.0}])));
+    folder.answer(
+        "second",
+        &report("explained", &[verdict(1, "viscous_friction", &[], 0.4, &json!([]), &[]), named(2, "coulomb_friction")]),
+    );
+    for (id, status, physics) in
+        [("o1", "unmodelled", "unmodelled"), ("o2", "explained", "coulomb_friction"), ("o3", "no_mismatch", "none")]
+    {
+        folder.seal(
+            id,
+            &truth(
+                id,
+                "outside",
+                &json!([{"physics": "outside:drag", "joint": 2, "joint_name": "elbow", "severity_wanted": 3.0, "severity": 3.0}]),
+            ),
+        );
         folder.answer(id, &report(status, &[verdict(1, physics, &["elbow"], 0.8, &json!([]), &[])]));
     }
     let score = folder.score();
