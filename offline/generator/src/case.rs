@@ -54,7 +54,12 @@ impl Order {
         let robot = |stepped| Robot { truth: &pair.truth, model: &pair.model, stepped };
         let sims: Vec<Signals> = trajectories.iter().map(|trajectory| play(&robot(false), &[], trajectory)).collect();
         let (exact, stepped) = (robot(false), robot(true));
-        let null = record(&play(&stepped, &[], &trajectories[0]), &pair.truth, &[], Some((&noise, &mut self.random("noise 0"))));
+        // noise in each channel, which only a severity needs
+        let null = if self.effects.is_empty() {
+            Signals::default()
+        } else {
+            record(&play(&stepped, &[], &trajectories[0]), &pair.truth, &[], Some((&noise, &mut self.random("noise 0"))))
+        };
         let clean = record(&sims[0], &pair.truth, &[], None);
         let scene = Scene { arm: &pair.truth, runs: &sims, noise: &noise };
         let bench = Bench { exact, trajectory: &trajectories[0], scene, null: &null, clean: &clean, seconds: self.seconds };
