@@ -23,12 +23,14 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "joints index several vectors and matrices at once, as in the equations")]
 
+pub mod any_arm;
 pub mod controller;
 pub mod model;
 pub mod physics;
 pub mod plant;
 pub mod production;
 pub mod replay;
+pub mod resimulate;
 pub mod simulation;
 pub mod trajectory;
 
@@ -37,6 +39,6 @@ mod random;
 mod robot_plant;
 mod tool_axes;
 
-pub use model::{Effect, Robot, RobotError};
+pub use model::{Effect, Robot, RobotError, RobotModel};
 pub use random::Random;
 pub use simulation::{Command, CycleOfArm, Simulation, TruthSample};

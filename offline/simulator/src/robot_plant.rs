@@ -5,14 +5,16 @@ use arm::{JOINTS, Motors, Raven2, Side};
 
 use crate::model::{Bound, Effect, Robot};
 use crate::physics::{LinkGeometry, Physics};
-use crate::plant::{CableLaw, Drive, DriveNumbers, JOINTS_MAX, Method, Plant, PlantError, Rubbing, Stiction, Timed};
+use crate::plant::{
+    Between, CableLaw, Drive, DriveNumbers, JOINTS_MAX, Method, Passive, Plant, PlantError, Rubbing, Stiction, Timed,
+};
 use crate::tool_axes::{FIRST, ToolAxes};
 
 /// Capstan torque under which a motor warms up by one unit: about the RMS torque of teleoperation, N·m **(assumed)**.
 const TORQUE_REF_NM: [f64; JOINTS] = [0.15, 0.15, 0.1, 0.03, 0.03, 0.03, 0.03];
 
 /// Rate times step up to which the explicit method is used: it is stable to 2.78, and the mass matrix changes with posture.
-const EXPLICIT_MAX: f64 = 2.0;
+pub(crate) const EXPLICIT_MAX: f64 = 2.0;
 
 /// Effects that the three positioning joints can have, but not a tool axis, whose transmission is rigid.
 const NEEDS_A_CABLE: &str = "the cables of joints 4 to 7 are rigid here; on them this effect cannot be";
@@ -50,7 +52,7 @@ pub(crate) fn build(robot: &Robot, side: Side, homing_offset: &Motors) -> Result
     Ok((plant, tool))
 }
 
-fn base_drive(robot: &Robot, side: Side, joint: usize) -> DriveNumbers {
+pub(crate) fn base_drive(robot: &Robot, side: Side, joint: usize) -> DriveNumbers {
     let plant = robot.raven.plant();
     let (friction, table) = (&plant.friction, &plant.transmission);
     let cable = match &robot.cables {
@@ -81,6 +83,8 @@ fn base_drive(robot: &Robot, side: Side, joint: usize) -> DriveNumbers {
         home: plant.limits.homing_stop[joint],
         torque_ref_nm: TORQUE_REF_NM[joint],
         torque_per_count_nm: robot.raven.arm(side).amplifiers.torque(joint, 1.0),
+        between: Between::Cable,
+        passive: Passive::NONE,
     }
 }
 
@@ -102,6 +106,8 @@ fn tool_drive(raven: &Raven2, side: Side, joint: usize) -> DriveNumbers {
         home: plant.limits.homing_stop[joint],
         torque_ref_nm: TORQUE_REF_NM[joint],
         torque_per_count_nm: raven.arm(side).amplifiers.torque(joint, 1.0),
+        between: Between::Cable,
+        passive: Passive::NONE,
     }
 }
 
@@ -150,7 +156,8 @@ fn add(plant: &mut Plant, tool: &mut ToolAxes, effect: &Effect) -> Result<(), Pl
     }
 }
 
-fn on_joint(plant: &mut Plant, effect: &Effect, joint: usize) -> Result<(), PlantError> {
+/// Puts an effect of a joint into its drive.
+pub(crate) fn on_joint(plant: &mut Plant, effect: &Effect, joint: usize) -> Result<(), PlantError> {
     let (from, to) = (effect.from_s, effect.to_s);
     match effect.physics {
         Physics::JointOffset(offset) => plant.add_offset(Timed::new(offset, from, to), joint),

@@ -14,7 +14,7 @@ use crate::robot_plant;
 use crate::tool_axes::{FIRST, ToolAxes};
 
 /// Purpose of the stream of random numbers that homing draws from.
-const HOMING: u64 = 1;
+pub(crate) const HOMING: u64 = 1;
 
 /// Where an arm truly is in a cycle, as instruments at the joints and a tracker at the tip would show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +114,15 @@ impl Simulation {
         self.state.memories = memories;
         self.tool.rest_at(motors);
         self.seen = None;
+    }
+
+    /// Puts the motors at angles, rad, and speeds, rad/s, the joints where gravity and those speeds put them.
+    pub fn start_at(&mut self, motors: &Motors, speeds: &[f64]) {
+        self.rest_at(motors);
+        let mut all = [0.0; JOINTS];
+        all[..FIRST].copy_from_slice(&speeds[..FIRST]);
+        self.state.speeds[..FIRST].copy_from_slice(&speeds[..FIRST]);
+        self.state.rates[..FIRST].copy_from_slice(&self.arm.transmission.joints(&all)[..FIRST]);
     }
 
     /// Another state of joints 1 to 3 and their motors.
@@ -234,14 +243,14 @@ impl Simulation {
     }
 }
 
-fn true_arm(robot: &Robot, side: Side) -> Arm {
+pub(crate) fn true_arm(robot: &Robot, side: Side) -> Arm {
     let bent = robot.effects.iter().any(|effect| matches!(effect.physics, Physics::LinkGeometry(_)));
     let raven: Raven2 = if bent { robot_plant::true_geometry(robot, side) } else { robot.raven.clone() };
     raven.arm(side)
 }
 
 /// The tracker's frames, one after the other.
-fn frame(effects: &[Effect]) -> Option<Isometry3<f64>> {
+pub(crate) fn frame(effects: &[Effect]) -> Option<Isometry3<f64>> {
     let frames = effects.iter().filter_map(|effect| match (effect.physics, effect.bound) {
         (Physics::FrameMisalignment(frame), Bound::Robot) => Some(frame.transform()),
         _ => None,

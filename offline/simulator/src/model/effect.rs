@@ -1,7 +1,5 @@
 //! One effect: a physics, where it is, and when it acts.
 
-use arm::JOINTS;
-
 use crate::physics::{Channel, MeasurementDelay, Parameters, Physics, Place, names, place_of};
 
 /// What an effect is bound to; joints and links count from 0.
@@ -11,7 +9,7 @@ pub enum Bound {
     Joint(usize),
     /// A joint, and the joint that drives it.
     Pair(usize, usize),
-    /// A link.
+    /// A link; one past the last is the tool that is fixed to it.
     Link(usize),
     /// A signal.
     Channel(Channel),
@@ -20,7 +18,7 @@ pub enum Bound {
 }
 
 /// One effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
     /// What.
     pub physics: Physics,
@@ -30,32 +28,51 @@ pub struct Effect {
     pub from_s: f64,
     /// Until when, s.
     pub to_s: f64,
+    /// Where its size comes from: for readers of the file.
+    pub source: Option<String>,
 }
 
-/// Where an effect is, as a file says it; numbers from 1.
+/// What joints and links are called; RAVEN-II's joints have names here that its file format shares with contracts.md.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Names {
+    pub(super) joints: Vec<String>,
+    /// With the tool, where it has a name of its own, in the last place.
+    pub(super) links: Vec<String>,
+}
+
+/// A joint or link as a file says it: number from 1, or name.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(untagged)]
+pub(super) enum Which {
+    Number(usize),
+    Name(String),
+}
+
+/// Where an effect is, as a file says it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Given {
-    pub(super) joint: Option<usize>,
-    pub(super) driven_by: Option<usize>,
-    pub(super) link: Option<usize>,
+    pub(super) joint: Option<Which>,
+    pub(super) driven_by: Option<Which>,
+    pub(super) link: Option<Which>,
     pub(super) channel: Option<String>,
     pub(super) from_s: Option<f64>,
     pub(super) to_s: Option<f64>,
+    pub(super) source: Option<String>,
 }
 
 impl Effect {
     /// An effect that acts all the time.
     pub fn new(physics: Physics, bound: Bound) -> Self {
-        Self { physics, bound, from_s: f64::NEG_INFINITY, to_s: f64::INFINITY }
+        Self { physics, bound, from_s: f64::NEG_INFINITY, to_s: f64::INFINITY, source: None }
     }
 
     /// From names and numbers; the error says what is wrong and what would do.
-    pub(super) fn given(name: &str, parameters: &Parameters, given: &Given) -> Result<Self, String> {
+    pub(super) fn given(name: &str, parameters: &Parameters, given: &Given, known: &Names) -> Result<Self, String> {
         let (Some(place), Some(physics)) = (place_of(name), Physics::new(name, parameters)) else {
             return Err(format!("no such physics; the vocabulary has {}", names().join(", ")));
         };
         let physics = physics.map_err(|error| error.to_string())?;
-        let bound = bound(place, given)?;
+        let bound = bound(place, given, known)?;
         let (from_s, to_s) = (given.from_s.unwrap_or(f64::NEG_INFINITY), given.to_s.unwrap_or(f64::INFINITY));
         if from_s.is_nan() || to_s.is_nan() || from_s >= to_s {
             return Err("from_s must lie before to_s".to_owned());
@@ -64,11 +81,11 @@ impl Effect {
         if !always && matches!(physics, Physics::MeasurementDelay(_) | Physics::LinkGeometry(_) | Physics::FrameMisalignment(_)) {
             return Err("acts all the time; leave out from_s and to_s".to_owned());
         }
-        Ok(Self { physics, bound, from_s, to_s })
+        Ok(Self { physics, bound, from_s, to_s, source: given.source.clone() })
     }
 }
 
-fn bound(place: Place, given: &Given) -> Result<Bound, String> {
+fn bound(place: Place, given: &Given, known: &Names) -> Result<Bound, String> {
     let unwanted = |key: &str, present: bool| if present { Err(format!("takes no `{key}`")) } else { Ok(()) };
     if place != Place::Pair {
         unwanted("driven_by", given.driven_by.is_some())?;
@@ -83,22 +100,29 @@ fn bound(place: Place, given: &Given) -> Result<Bound, String> {
         unwanted("channel", given.channel.is_some())?;
     }
     match place {
-        Place::Joint => Ok(Bound::Joint(number("joint", given.joint)?)),
+        Place::Joint => Ok(Bound::Joint(index("joint", given.joint.as_ref(), &known.joints)?)),
         Place::Pair => {
-            let (driven, driver) = (number("joint", given.joint)?, number("driven_by", given.driven_by)?);
+            let driven = index("joint", given.joint.as_ref(), &known.joints)?;
+            let driver = index("driven_by", given.driven_by.as_ref(), &known.joints)?;
             if driven == driver { Err("`driven_by` must be another joint".to_owned()) } else { Ok(Bound::Pair(driven, driver)) }
         }
-        Place::Link => Ok(Bound::Link(number("link", given.link)?)),
+        Place::Link => Ok(Bound::Link(index("link", given.link.as_ref(), &known.links)?)),
         Place::Channel => channel(given.channel.as_deref()),
         Place::Robot => Ok(Bound::Robot),
     }
 }
 
-fn number(key: &str, given: Option<usize>) -> Result<usize, String> {
+/// Place from 0 among the names.
+pub(super) fn index(key: &str, given: Option<&Which>, names: &[String]) -> Result<usize, String> {
+    let what = || format!("1 to {} or one of {}", names.len(), names.join(", "));
     match given {
-        Some(number @ 1..=JOINTS) => Ok(number - 1),
-        Some(number) => Err(format!("`{key}` is {number}, must be 1 to {JOINTS}")),
-        None => Err(format!("needs `{key}` = 1 to {JOINTS}")),
+        Some(Which::Number(number)) if (1..=names.len()).contains(number) => Ok(number - 1),
+        Some(Which::Number(number)) => Err(format!("`{key}` is {number}, must be {}", what())),
+        Some(Which::Name(name)) => {
+            let found = names.iter().position(|known| known == name);
+            found.ok_or_else(|| format!("`{key}` is `{}`, must be {}", name.escape_debug(), what()))
+        }
+        None => Err(format!("needs `{key}` = {}", what())),
     }
 }
 

@@ -1,6 +1,10 @@
 //! `cable_hysteresis`: a cable whose force depends on the history of its deflection (Bouc-Wen).
+//!
+//! Cables have `z_m > 0` and `g` from 0.5 to 1. The equation also describes elements that harden: there the knee grows the
+//! other way, `zd = Dd (1 + |z / z_m|^n (g + (1 - g) sgn(Dd z)))`, which a negative `z_m` stands for
+//! ([`CableHysteresis::of_bouc_wen`]).
 
-use super::parameters::{POSITIVE, Parameter, ParameterError, Parameters};
+use super::parameters::{ANY, POSITIVE, Parameter, ParameterError, Parameters};
 
 /// `tau_c = a k D + (1 - a) k z`; `zd = Dd (1 - |z / z_m|^n (g + (1 - g) sgn(Dd z)))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,11 +13,11 @@ pub struct CableHysteresis {
     pub a: f64,
     /// Stiffness at small deflections, N·m/rad or N/m.
     pub k: f64,
-    /// Largest memory, rad or m.
+    /// Largest memory, rad or m. Negative: the element hardens with its memory instead of giving way (see the module).
     pub z_m: f64,
     /// Sharpness of the knee.
     pub n: f64,
-    /// Shape: 1 bends in both directions alike, 0.5 unloads straight.
+    /// Shape: 1 bends in both directions alike, 0.5 unloads straight; cables lie between, other elements anywhere.
     pub g: f64,
 }
 
@@ -22,9 +26,9 @@ impl CableHysteresis {
     pub const PARAMETERS: [Parameter; 5] = [
         Parameter::needed("a", "1", (0.0, 1.0)),
         Parameter::needed("k", "N.m/rad|N/m", POSITIVE),
-        Parameter::needed("z_m", "rad|m", POSITIVE),
+        Parameter::needed("z_m", "rad|m", ANY),
         Parameter::optional("n", "1", 1.0, (1.0, 10.0)),
-        Parameter::optional("g", "1", 0.5, (0.5, 1.0)),
+        Parameter::optional("g", "1", 0.5, ANY),
     ];
 
     /// From parameters by name.
@@ -33,7 +37,22 @@ impl CableHysteresis {
     /// [`ParameterError`] for unknown, missing and impossible values.
     pub fn new(parameters: &Parameters) -> Result<Self, ParameterError> {
         let [a, k, z_m, n, g] = parameters.numbers(&Self::PARAMETERS)?;
+        if z_m == 0.0 {
+            let (found, expected) = ("0".to_owned(), "one number other than 0".to_owned());
+            return Err(ParameterError::Range { name: "z_m", found, expected, unit: "rad|m" });
+        }
         Ok(Self { a, k, z_m, n, g })
+    }
+
+    /// From the form in which the literature has it (Noël, Schoukens 2016): a spring `k y` beside
+    /// `z' = alpha y' - beta (gamma |y'| |z|^(nu-1) z + delta y' |z|^nu)`, forces in N·m or N. Both are the same element:
+    /// `a = k / (k + alpha)`, stiffness `k + alpha`, `g = delta / (gamma + delta)`, `n = nu`,
+    /// `z_m = sgn(gamma + delta) (beta |gamma + delta| alpha^(nu-1))^(-1/nu)`.
+    /// With `gamma + delta = 0` there is no such form.
+    pub fn of_bouc_wen(k: f64, alpha: f64, beta: f64, gamma: f64, delta: f64, nu: f64) -> Self {
+        let both = gamma + delta;
+        let z_m = both.signum() * (beta * both.abs() * alpha.powf(nu - 1.0)).powf(-1.0 / nu);
+        Self { a: k / (k + alpha), k: k + alpha, z_m, n: nu, g: delta / both }
     }
 
     /// Force of the cable at a deflection and memory, N·m or N.
@@ -47,6 +66,7 @@ impl CableHysteresis {
     pub fn memory_rate(&self, deflection_rate: f64, memory: f64) -> f64 {
         let ratio = (memory / self.z_m).abs();
         let knee = if self.n == 1.0 { ratio } else { ratio.powf(self.n) };
+        let knee = if self.z_m < 0.0 { -knee } else { knee };
         let loading = if deflection_rate * memory > 0.0 { 1.0 } else { 2.0 * self.g - 1.0 };
         deflection_rate * (1.0 - knee * loading)
     }
@@ -55,7 +75,7 @@ impl CableHysteresis {
     #[inline]
     pub fn slope(&self, deflection_rate: f64, memory: f64) -> f64 {
         let along = if deflection_rate == 0.0 { 1.0 } else { self.memory_rate(deflection_rate, memory) / deflection_rate };
-        self.k * (self.a + (1.0 - self.a) * along.clamp(0.0, 2.0))
+        self.k * (self.a + (1.0 - self.a) * along.clamp(0.0, 20.0))
     }
 }
 
@@ -105,6 +125,23 @@ mod tests {
             }
         }
         assert!((slow.last().expect("steps").1 - last).abs() < 2e-3);
+    }
+
+    #[test]
+    fn the_form_of_the_literature_is_the_same_element() {
+        for (gamma, delta, nu) in [(0.8, -1.1, 1.0), (0.8, 0.4, 1.0), (0.7, -0.2, 1.6), (0.5, -0.9, 2.0)] {
+            let (k, alpha, beta) = (5e4, 4e4, 1e3);
+            let cable = CableHysteresis::of_bouc_wen(k, alpha, beta, gamma, delta, nu);
+            let (mut memory, mut z, mut y) = (0.0_f64, 0.0_f64, 0.0);
+            for step in 0..20_000 {
+                let rate = 1e-7 * (f64::from(step) * 2e-3).cos();
+                memory += cable.memory_rate(rate, memory);
+                z += alpha * rate - beta * (gamma * rate.abs() * z.abs().powf(nu - 1.0) * z + delta * rate * z.abs().powf(nu));
+                y += rate;
+                let (ours, theirs) = (cable.force(y, memory), k * y + z);
+                assert!((ours - theirs).abs() < 1e-6 * theirs.abs().max(1e-3), "{gamma} {delta} {nu}: {ours} {theirs}");
+            }
+        }
     }
 
     #[test]

@@ -39,7 +39,9 @@ impl ExternalContact {
         parameters.only(&Self::PARAMETERS, &Self::VECTORS)?;
         let [k, f_max, x_0, p] = &Self::PARAMETERS;
         let n = Vector3::from(parameters.vector::<3>(&Self::VECTORS[0])?);
-        let n = n.try_normalize(1e-9).ok_or(ParameterError::Range {
+        // A unit vector stays as it is, so that a saved file reads as itself.
+        let unit = if (n.norm_squared() - 1.0).abs() < 4.0 * f64::EPSILON { Some(n) } else { n.try_normalize(1e-9) };
+        let n = unit.ok_or(ParameterError::Range {
             name: "n",
             found: "zero".to_owned(),
             expected: "a direction".to_owned(),

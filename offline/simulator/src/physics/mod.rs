@@ -30,6 +30,7 @@ pub mod viscous_friction;
 
 mod parameters;
 mod table;
+mod values;
 
 pub use backlash::Backlash;
 pub use cable_creep::CableCreep;

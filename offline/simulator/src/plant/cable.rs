@@ -11,6 +11,13 @@ pub enum CableLaw {
         /// N·s/m.
         be_ns_m: f64,
     },
+    /// A straight line.
+    Linear {
+        /// N/m.
+        k_n_m: f64,
+        /// N·s/m.
+        d_ns_m: f64,
+    },
     /// Two cables, each `F(x) = k l (exp(x / l) - 1)` where it is taut and 0 where it is slack, both stretched beforehand until
     /// they carry the pretension. The stiffness rises with the load; beyond the pretension one side hangs through and half
     /// the stiffness is gone.
@@ -58,6 +65,7 @@ impl CableLaw {
                 };
                 CableForce { force_n: 2.0 * ke_n * sinh, stiffness_n_m: 2.0 * ke_n * cosh, damping_ns_m: 2.0 * be_ns_m }
             }
+            Self::Linear { k_n_m, d_ns_m } => CableForce { force_n: k_n_m * stretch_m, stiffness_n_m: k_n_m, damping_ns_m: d_ns_m },
             Self::Pretensioned { k_n_m, length_m, prestretch_m, be_ns_m } => {
                 let side = |stretch: f64| {
                     if stretch <= 0.0 {
@@ -76,7 +84,7 @@ impl CableLaw {
     /// Tensions of the two sides at a stretch, N; none for a law that does not tell them apart.
     pub fn tensions_n(&self, stretch_m: f64) -> Option<[f64; 2]> {
         match *self {
-            Self::Exponential { .. } => None,
+            Self::Exponential { .. } | Self::Linear { .. } => None,
             Self::Pretensioned { k_n_m, length_m, prestretch_m, .. } => {
                 let side = |stretch: f64| k_n_m * length_m * (stretch.max(0.0) / length_m).exp_m1();
                 Some([side(prestretch_m + stretch_m), side(prestretch_m - stretch_m)])

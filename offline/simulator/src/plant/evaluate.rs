@@ -1,6 +1,6 @@
 //! Forces at one state.
 
-use super::{JOINTS_MAX, MEMORIES_MAX, Plant, State, Vector, on};
+use super::{Between, JOINTS_MAX, MEMORIES_MAX, Passive, Plant, State, Vector, on};
 use crate::physics::LoadDependentFriction;
 
 /// Everything that a time step needs to know about one state.
@@ -22,6 +22,8 @@ pub(super) struct Evaluation {
     pub(super) joint_slope: Vector,
     /// Chord of the motor friction, N·m at the capstan per rad/s.
     pub(super) motor_slope: Vector,
+    /// Friction of rigid motors over the rate of the joints.
+    pub(super) rigid_slope: Vector,
     /// Rates of the memories.
     pub(super) memory_rates: [f64; MEMORIES_MAX],
 }
@@ -36,6 +38,7 @@ impl Evaluation {
         damping: [0.0; JOINTS_MAX],
         joint_slope: [0.0; JOINTS_MAX],
         motor_slope: [0.0; JOINTS_MAX],
+        rigid_slope: [0.0; JOINTS_MAX],
         memory_rates: [0.0; MEMORIES_MAX],
     };
 }
@@ -58,22 +61,28 @@ impl Plant {
             seen[i] = state.motors[i] / ratio;
             seen_rate[i] = state.speeds[i] / ratio;
         }
+        if self.rigid {
+            self.see_rigid(state, &mut seen, &mut seen_rate);
+        }
         let mut slope = [0.0; JOINTS_MAX];
         if self.shifted {
             slope = self.shift(&mut seen, &mut seen_rate);
         }
+        if self.rigid {
+            self.ground(&mut seen, &mut seen_rate);
+        }
         let mut found = Deflection { position: seen, rate: seen_rate, slope };
         for i in 0..n {
             for j in 0..n {
-                found.position[i] -= self.coupling[i][j] * state.joints[j];
-                found.rate[i] -= self.coupling[i][j] * state.rates[j];
+                found.position[i] -= self.path[i][j] * state.joints[j];
+                found.rate[i] -= self.path[i][j] * state.rates[j];
             }
         }
         found
     }
 
     /// Adds to motor-side positions and rates what the controller does not know: offsets, wrong ratios, eccentric pulleys.
-    fn shift(&self, seen: &mut Vector, seen_rate: &mut Vector) -> Vector {
+    pub(super) fn shift(&self, seen: &mut Vector, seen_rate: &mut Vector) -> Vector {
         let n = self.joints;
         let mut slope = [0.0; JOINTS_MAX];
         let mut shift = [0.0; JOINTS_MAX];
@@ -94,7 +103,7 @@ impl Plant {
     }
 
     /// Torque with which the cables pull back, in joint units on the motor's side: `(dx/dm)^T T` without the ratio.
-    fn reaction(&self, torque: &Vector, slope: &Vector) -> Vector {
+    pub(super) fn reaction(&self, torque: &Vector, slope: &Vector) -> Vector {
         if !self.shifted {
             return *torque;
         }
@@ -123,24 +132,31 @@ impl Plant {
             out.damping[i] = cable.damping;
             drive.memories(cable.torque, found.rate[i], applied_nm[i], &state.memories, &mut out.memory_rates);
         }
-        let reaction = self.reaction(&torque, &found.slope);
-        let external = self.external(state);
+        let reaction = self.reaction(&self.of_cables(&torque), &found.slope);
+        let mut external = self.external(state);
+        if self.rigid {
+            self.push_rigid(state, applied_nm, &mut external, &mut out.rigid_slope);
+        }
         for i in 0..n {
             let drive = &self.drives[i];
             let warm = if drive.thermal.is_empty() { 1.0 } else { drive.warm_share(&state.memories) };
-            let (motor_friction, motor_slope) = drive.motor_friction(state.speeds[i], warm);
             let nominal = &drive.nominal;
-            out.motor[i] = applied_nm[i] - motor_friction - nominal.gear / nominal.ratio * reaction[i];
-            if !drive.ripple.is_empty() {
-                out.motor[i] += drive.ripple(state.motors[i]);
+            if nominal.between == Between::Rigid {
+                (out.motor[i], out.motor_slope[i]) = (0.0, 0.0);
+            } else {
+                let (motor_friction, motor_slope) = drive.motor_friction(state.speeds[i], warm);
+                out.motor[i] = applied_nm[i] - motor_friction - nominal.gear / nominal.ratio * reaction[i];
+                if !drive.ripple.is_empty() {
+                    out.motor[i] += drive.ripple(state.motors[i]);
+                }
+                out.motor_slope[i] = motor_slope;
             }
-            out.motor_slope[i] = motor_slope;
             if let Some(stiction) = drive.stiction {
                 out.memory_rates[stiction.slot] = stiction.rate(state.rates[i], state.memories[stiction.slot], self.step_s);
             }
             let friction = drive.joint_friction(state.rates[i], warm, &state.memories);
-            let pulled: f64 = (0..n).map(|k| self.coupling[k][i] * torque[k]).sum::<f64>() + external[i] - friction.torque;
-            out.joint_slope[i] = friction.slope;
+            let pulled: f64 = (0..n).map(|k| self.path[k][i] * torque[k]).sum::<f64>() + external[i] - friction.torque;
+            out.joint_slope[i] = friction.slope + out.rigid_slope[i];
             out.drive[i] = if friction.per_load == 0.0 {
                 pulled
             } else {
@@ -150,11 +166,20 @@ impl Plant {
         }
         let (mass, bias) = (&mut out.mass[..n * n], &mut out.bias[..n]);
         self.body.mass_matrix_and_bias(&mut self.workspace, &state.joints[..n], &state.rates[..n], mass, bias);
+        if self.rigid {
+            self.add_armatures(&mut out.mass);
+        }
     }
 
-    /// Joint torques of what the tip touches.
+    /// Joint torques of what the tip touches and of springs to the ground.
     pub(super) fn external(&mut self, state: &State) -> Vector {
         let mut out = [0.0; JOINTS_MAX];
+        for (i, drive) in self.drives.iter().enumerate() {
+            let passive = &drive.nominal.passive;
+            if *passive != Passive::NONE {
+                out[i] = passive.stiffness * (passive.rest - state.joints[i]) - passive.damping * state.rates[i];
+            }
+        }
         if self.contacts.iter().all(|contact| !contact.on) {
             return out;
         }

@@ -3,19 +3,23 @@
 //! Equations of raven2-plant.md, section 7, in joint units: deflection `D = x(m) - C q`, cable torque `T(D, D')`,
 //! `M(q) q'' + c + g = C^T T - friction + J^T f`, `Im m'' = tau - friction - gear (dx/dm)^T T`. `C` is the cable coupling as
 //! it is; `x(m)` is what the controller would compute from the motors plus homing offset, wrong ratio and eccentric pulleys.
+//! A rigid drive has no deflection: its motor is part of the link (`rigid.rs`).
 
 mod cable;
 mod drive;
 mod evaluate;
+mod inverse;
 mod rest;
+mod rigid;
 mod step;
 
 use arm::serial::{SerialArm, Workspace};
 use nalgebra::Vector3;
 
 pub use cable::{CableForce, CableLaw};
+pub use drive::{Between, DriveNumbers, Passive, Rubbing};
 pub(crate) use drive::{Drive, Stiction, Timed, on};
-pub use drive::{DriveNumbers, Rubbing};
+pub use inverse::{Given, Memory, Needed};
 pub use step::Method;
 
 use crate::physics::{ExternalContact, GravityDirection, JointCoupling, JointOffset, LinkInertia, Payload};
@@ -71,6 +75,12 @@ pub enum PlantError {
     /// Too many effects with memory.
     #[error("effects with memory take more than {MEMORIES_MAX} places; leave some out")]
     Memories,
+    /// A joint that moves nothing.
+    #[error("joint {joint} moves no mass; give its link an <inertial> or [inertial], or its drive a rotor_inertia_kg_m2")]
+    Massless {
+        /// Joint, from 1.
+        joint: usize,
+    },
     /// An effect where it cannot be.
     #[error("{physics} on joint {joint}: {why}")]
     Place {
@@ -97,6 +107,10 @@ pub struct Plant {
     coupling_inverse: Matrix,
     /// As it is.
     coupling: Matrix,
+    /// Deflection per joint position: `coupling`, but for rigid drives, whose spring is between joint and ground.
+    path: Matrix,
+    /// Is any drive rigid?
+    rigid: bool,
     /// (driven, driver).
     coupling_errors: Vec<(Timed<JointCoupling>, usize, usize)>,
     offsets: Vec<(Timed<JointOffset>, usize)>,
@@ -144,6 +158,8 @@ impl Plant {
             coupling_inverse: inverse(&matrix, joints).ok_or(PlantError::Coupling)?,
             coupling_nominal: matrix,
             coupling: matrix,
+            path: matrix,
+            rigid: drives.iter().any(|drive| drive.between == Between::Rigid),
             coupling_errors: Vec::new(),
             offsets: Vec::new(),
             payloads: Vec::new(),
@@ -183,11 +199,48 @@ impl Plant {
             let drive = &self.drives[i];
             let nominal = &drive.nominal;
             let damping = nominal.radius_m * nominal.radius_m * nominal.cable.at(0.0).damping_ns_m;
-            fastest = fastest.max((drive.steepest_friction() + damping) / mass[i * n + i]);
             let motor = nominal.motor.coulomb / nominal.motor.width + nominal.motor.viscous;
+            let link = drive.steepest_friction() + damping + nominal.passive.damping;
+            if nominal.between == Between::Rigid {
+                let armature = nominal.ratio * nominal.ratio / nominal.gear;
+                fastest = fastest.max((link + armature * motor) / (mass[i * n + i] + armature * nominal.inertia));
+                continue;
+            }
+            fastest = fastest.max(link / mass[i * n + i]);
             fastest = fastest.max((motor + nominal.gear / (nominal.ratio * nominal.ratio) * damping) / nominal.inertia);
         }
         fastest
+    }
+
+    /// Largest angular frequency with which a link or motor vibrates on its own cable or spring, rad/s, at joint positions.
+    pub fn fastest_frequency(&mut self, joints: &Vector) -> f64 {
+        let n = self.joints;
+        let mut mass = [0.0; JOINTS_MAX * JOINTS_MAX];
+        self.body.mass_matrix(&mut self.workspace, &joints[..n], &mut mass[..n * n]);
+        self.add_armatures(&mut mass);
+        let mut fastest = 0.0_f64;
+        for (i, drive) in self.drives.iter().enumerate() {
+            let nominal = &drive.nominal;
+            let known = nominal.radius_m * nominal.radius_m * nominal.cable.at(0.0).stiffness_n_m;
+            let stiffness = drive.hysteresis.iter().map(|(cable, _)| cable.effect.k).fold(known, f64::max);
+            let motor = match nominal.between {
+                Between::Cable => nominal.gear / (nominal.ratio * nominal.ratio * nominal.inertia),
+                Between::Rigid => 0.0,
+            };
+            let link = 1.0 / mass[i * n + i];
+            fastest = fastest.max(stiffness * (link + motor) + nominal.passive.stiffness * link);
+        }
+        fastest.sqrt()
+    }
+
+    /// The first joint that nothing with inertia hangs on at joint positions; none if all can be accelerated.
+    pub fn massless(&mut self, joints: &Vector) -> Option<usize> {
+        let n = self.joints;
+        let mut mass = [0.0; JOINTS_MAX * JOINTS_MAX];
+        self.body.mass_matrix(&mut self.workspace, &joints[..n], &mut mass[..n * n]);
+        self.add_armatures(&mut mass);
+        let largest = (0..n).map(|i| mass[i * n + i]).fold(0.0, f64::max);
+        (0..n).find(|i| mass[i * n + i].is_nan() || mass[i * n + i] <= 1e-12 * largest)
     }
 
     /// The rigid body as it is now.
@@ -258,6 +311,7 @@ impl Plant {
         for (effect, driven, driver) in self.coupling_errors.iter().filter(|(effect, ..)| effect.on) {
             self.coupling[*driven][*driver] += effect.effect.c_ij;
         }
+        self.path = self.paths();
         self.drives.iter_mut().for_each(|drive| drive.offset = 0.0);
         for (effect, joint) in self.offsets.iter().filter(|(effect, _)| effect.on) {
             self.drives[*joint].offset += effect.effect.o;
@@ -280,7 +334,7 @@ impl Plant {
 }
 
 /// Inverse of the leading `n` by `n` part, by Gauss-Jordan with pivots; none if singular.
-fn inverse(matrix: &Matrix, n: usize) -> Option<Matrix> {
+pub(crate) fn inverse(matrix: &Matrix, n: usize) -> Option<Matrix> {
     let mut left = nalgebra::DMatrix::from_fn(n, n, |row, column| matrix[row][column]);
     if !left.try_inverse_mut() {
         return None;

@@ -1,19 +1,29 @@
 //! Where the joints are while the motors stand still.
 
-use super::{Plant, State, Vector};
+use super::{Between, MEMORIES_MAX, Plant, State, Vector};
 
 impl Plant {
     /// The state at rest with motors at given angles, rad: cables carry gravity, friction and dead bands carry nothing.
     /// Found by Newton steps on the static balance; play is then settled by the first milliseconds of any run.
     pub fn at_rest(&mut self, motors: &Vector) -> State {
+        self.at_rest_with(motors, &State::ZERO.memories)
+    }
+
+    /// The same with what hysteresis, creep and warmth remember.
+    pub fn at_rest_with(&mut self, motors: &Vector, memories: &[f64; MEMORIES_MAX]) -> State {
         let n = self.joints;
-        let mut state = State { motors: *motors, ..State::ZERO };
+        let mut state = State { motors: *motors, memories: *memories, ..State::ZERO };
         let mut seen = [0.0; super::JOINTS_MAX];
         for i in 0..n {
             seen[i] = motors[i] / self.drives[i].nominal.ratio;
         }
         for i in 0..n {
             state.joints[i] = (0..n).map(|k| self.coupling_inverse[i][k] * seen[k]).sum();
+        }
+        // Where rigid motors put their joints.
+        let mut held = seen;
+        if self.shifted {
+            self.shift(&mut held, &mut [0.0; super::JOINTS_MAX]);
         }
         let Some(coupling_inverse) = super::inverse(&self.coupling, n) else { return state };
         let mut gravity = [0.0; super::JOINTS_MAX];
@@ -26,6 +36,10 @@ impl Plant {
             for i in 0..n {
                 let carried: f64 = (0..n).map(|k| coupling_inverse[k][i] * (gravity[k] - external[k])).sum();
                 let drive = &self.drives[i];
+                if drive.nominal.between == Between::Rigid {
+                    missing[i] = (0..n).map(|j| self.coupling[i][j] * state.joints[j]).sum::<f64>() - held[i];
+                    continue;
+                }
                 let cable = drive.elastic(found.position[i], 0.0, &state.memories);
                 let wanted = carried - cable.torque;
                 // Inside a dead band the cable has a slope but no torque: step out of it.

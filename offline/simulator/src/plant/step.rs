@@ -1,7 +1,7 @@
 //! Time steps.
 
 use super::evaluate::Evaluation;
-use super::{JOINTS_MAX, MEMORIES_MAX, Plant, State, Vector};
+use super::{Between, JOINTS_MAX, MEMORIES_MAX, Passive, Plant, State, Vector};
 
 /// How a step is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +32,7 @@ impl Plant {
                 Method::Rosenbrock => self.rosenbrock(state, &applied, step_s),
             }
         }
+        self.follow(state);
     }
 
     fn rk4(&mut self, state: &mut State, applied: &Vector, h: f64) {
@@ -174,6 +175,8 @@ struct Linear<'a> {
     evaluation: &'a Evaluation,
     /// `P`: deflection per motion of links and motors; `[i][..n]` is -C, `[i][n + i]` 1 over the ratio.
     motion: [[f64; BOTH]; JOINTS_MAX],
+    /// Springs and dampers of the joints to the ground.
+    passive: [Passive; JOINTS_MAX],
     /// Inertia of the motors over their gear.
     inertia: Vector,
     motor_slope: Vector,
@@ -183,17 +186,19 @@ impl<'a> Linear<'a> {
     fn new(plant: &Plant, evaluation: &'a Evaluation) -> Self {
         let n = plant.joints;
         let mut motion = [[0.0; BOTH]; JOINTS_MAX];
+        let mut passive = [Passive::NONE; JOINTS_MAX];
         let (mut inertia, mut motor_slope) = ([0.0; JOINTS_MAX], [0.0; JOINTS_MAX]);
         for i in 0..n {
             let nominal = &plant.drives[i].nominal;
             for j in 0..n {
-                motion[i][j] = -plant.coupling[i][j];
+                motion[i][j] = -plant.path[i][j];
             }
-            motion[i][n + i] = 1.0 / nominal.ratio;
+            motion[i][n + i] = if nominal.between == Between::Rigid { 0.0 } else { 1.0 / nominal.ratio };
+            passive[i] = nominal.passive;
             inertia[i] = nominal.inertia / nominal.gear;
             motor_slope[i] = evaluation.motor_slope[i] / nominal.gear;
         }
-        Self { n, evaluation, motion, inertia, motor_slope }
+        Self { n, evaluation, motion, passive, inertia, motor_slope }
     }
 
     /// Forces, motor rows over the gear.
@@ -215,6 +220,7 @@ impl<'a> Linear<'a> {
             for k in 0..2 * self.n {
                 out[k] += row[k] * pull;
             }
+            out[i] += self.passive[i].stiffness * u[i];
         }
         out
     }
@@ -238,7 +244,7 @@ impl<'a> Linear<'a> {
             for j in 0..=i {
                 matrix[i][j] = self.evaluation.mass[i * n + j];
             }
-            matrix[i][i] += gh * self.evaluation.joint_slope[i];
+            matrix[i][i] += gh * (self.evaluation.joint_slope[i] + self.passive[i].damping) + gh * gh * self.passive[i].stiffness;
             matrix[n + i][n + i] = self.inertia[i] + gh * self.motor_slope[i];
         }
         for i in 0..n {

@@ -6,16 +6,16 @@
 mod teleoperation;
 mod zigzag;
 
-use arm::{JOINTS, Joints};
+use arm::JOINTS;
 
-pub use teleoperation::teleoperation;
+pub use teleoperation::{teleoperation, teleoperation_within};
 pub use zigzag::zigzag;
 
 /// From one posture to the next, then a rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Move {
+pub struct Move<const N: usize = JOINTS> {
     /// Where it ends, rad and m.
-    pub to: Joints,
+    pub to: [f64; N],
     /// Duration of the motion, s.
     pub duration_s: f64,
     /// Rest at its end, s.
@@ -27,17 +27,17 @@ pub struct Move {
 
 /// A sequence of moves.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trajectory {
-    start: Joints,
-    moves: Vec<Move>,
+pub struct Trajectory<const N: usize = JOINTS> {
+    start: [f64; N],
+    moves: Vec<Move<N>>,
     /// When each move begins, s.
     begins_s: Vec<f64>,
     duration_s: f64,
 }
 
-impl Trajectory {
+impl<const N: usize> Trajectory<N> {
     /// Moves from a posture on.
-    pub fn new(start: Joints, moves: Vec<Move>) -> Self {
+    pub fn new(start: [f64; N], moves: Vec<Move<N>>) -> Self {
         let mut duration_s = 0.0;
         let begins_s = moves
             .iter()
@@ -51,7 +51,7 @@ impl Trajectory {
     }
 
     /// Posture at its beginning.
-    pub fn start(&self) -> &Joints {
+    pub fn start(&self) -> &[f64; N] {
         &self.start
     }
 
@@ -61,12 +61,12 @@ impl Trajectory {
     }
 
     /// Its moves.
-    pub fn moves(&self) -> &[Move] {
+    pub fn moves(&self) -> &[Move<N>] {
         &self.moves
     }
 
     /// Commanded joints at a time, s; before the start the first, after the end the last posture.
-    pub fn at(&self, time_s: f64) -> Joints {
+    pub fn at(&self, time_s: f64) -> [f64; N] {
         let index = self.begins_s.partition_point(|begins| *begins <= time_s);
         let Some(index) = index.checked_sub(1) else { return self.start };
         let step = &self.moves[index];
@@ -115,8 +115,8 @@ pub const SPEED_MAX: [f64; JOINTS] = [0.75, 0.65, 0.055, 2.0, 2.0, 2.0, 2.0];
 const BELL_PEAK: f64 = 1.875;
 
 /// Shortest duration of a bell between two postures, s.
-fn shortest_bell_s(from: &Joints, to: &Joints) -> f64 {
-    (0..JOINTS).map(|joint| BELL_PEAK * (to[joint] - from[joint]).abs() / SPEED_MAX[joint]).fold(0.0, f64::max)
+fn shortest_bell_s<const N: usize>(from: &[f64; N], to: &[f64; N], fastest: &[f64; N]) -> f64 {
+    (0..N).map(|joint| BELL_PEAK * (to[joint] - from[joint]).abs() / fastest[joint]).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use arm::{JOINTS, Joints};
 
-use super::{Move, Range, Trajectory, shortest_bell_s};
+use super::{Move, Range, SPEED_MAX, Trajectory, shortest_bell_s};
 use crate::random::Random;
 
 /// Median duration of a reach, s, and the spread of its logarithm **(assumed)**.
@@ -17,15 +17,26 @@ const NEAR_SIZE: f64 = 0.18;
 /// Share of reaches with a pause at the end **(assumed)**, and its longest, s.
 const PAUSE: (f64, f64) = (0.25, 1.6);
 
-/// At least `duration_s` of reaches inside `ranges`, starting at `start`.
+/// At least `duration_s` of reaches of a RAVEN-II inside `ranges`, starting at `start`.
 pub fn teleoperation(seed: u64, start: Joints, ranges: &[Range; JOINTS], duration_s: f64) -> Trajectory {
+    teleoperation_within(seed, start, ranges, &SPEED_MAX, duration_s)
+}
+
+/// At least `duration_s` of reaches of any arm inside `ranges`, no joint faster than its speed in `fastest`.
+pub fn teleoperation_within<const N: usize>(
+    seed: u64,
+    start: [f64; N],
+    ranges: &[Range; N],
+    fastest: &[f64; N],
+    duration_s: f64,
+) -> Trajectory<N> {
     let mut random = Random::new(seed, 2);
     let mut at = start;
     let mut moves = Vec::new();
     let mut total_s = 0.0;
     while total_s < duration_s {
         let far = random.share() < FAR_SHARE;
-        let to: Joints = std::array::from_fn(|joint| {
+        let to: [f64; N] = std::array::from_fn(|joint| {
             let (low, high) = ranges[joint];
             if far {
                 random.between(low, high)
@@ -34,7 +45,7 @@ pub fn teleoperation(seed: u64, start: Joints, ranges: &[Range; JOINTS], duratio
             }
         });
         let wanted_s = REACH_S.0 * (REACH_S.1 * random.normal()).exp() * if far { 1.6 } else { 1.0 };
-        let reach_s = wanted_s.max(REACH_MIN_S).max(shortest_bell_s(&at, &to));
+        let reach_s = wanted_s.max(REACH_MIN_S).max(shortest_bell_s(&at, &to, fastest));
         let rest_s = if random.share() < PAUSE.0 { random.between(0.1, PAUSE.1) } else { 0.0 };
         moves.push(Move { to, duration_s: reach_s, rest_s, ramp: 0.5 });
         total_s += reach_s + rest_s;

@@ -52,7 +52,7 @@ fn block(random: &mut Random, from: Joints, ranges: &[Range; JOINTS]) -> Vec<Mov
             for joint in 3..JOINTS {
                 turn[joint] = part(joint, random.between(0.2, 0.8));
             }
-            let approach_s = shortest_bell_s(&at, &turn).max(0.5);
+            let approach_s = shortest_bell_s(&at, &turn, &SPEED_MAX).max(0.5);
             moves.push(Move { to: turn, duration_s: approach_s, rest_s: 0.0, ramp: 0.5 });
             let mut crossing = turn;
             crossing[crossed] = part(crossed, far);

@@ -1,0 +1,14 @@
+//! Arms from URDF in motion: their plant, their sensors, their controller, where they are sent.
+
+mod build;
+mod commands;
+mod sensors;
+mod servo;
+mod simulation;
+
+pub(crate) use build::{bent, build, middle};
+pub use commands::{ranges, speeds, trajectory};
+pub(crate) use sensors::{Seen, Sensors, is_timed};
+pub use servo::default_gains;
+pub(crate) use servo::Servo;
+pub use simulation::{ArmCycle, ArmSimulation};

@@ -1,0 +1,81 @@
+//! The recorded torque drives the plant.
+
+use super::hold::Held;
+use super::{Hold, ResimulateError, Run, Simulated};
+use crate::any_arm::{Sensors, is_timed};
+use crate::model::RobotModel;
+use crate::plant::{JOINTS_MAX, Plant, State, Vector};
+
+/// How the recorded torque drives the plant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OpenLoop {
+    /// After so long the plant starts again from the measured state, s: without a controller, weight and friction that are
+    /// slightly off carry it away. Infinite: never.
+    pub window_s: f64,
+    /// What the torque does between two samples.
+    pub hold: Hold,
+}
+
+impl Default for OpenLoop {
+    /// Windows of one second, torque in steps.
+    fn default() -> Self {
+        Self { window_s: 1.0, hold: Hold::Steps }
+    }
+}
+
+/// The run of a robot whose motors are driven by the recorded torque. Each window starts with motors and speeds as recorded
+/// and the joints where weight puts them; what cables and friction remember is kept. Without motors it starts at rest at 0.
+///
+/// # Errors
+/// [`ResimulateError`] without torque, and for effects that cannot be where they are.
+pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Simulated, ResimulateError> {
+    let Some(torque) = &run.torque else {
+        return Err(run.missing("tau_1_nm", "an open loop needs the torque of every motor (tau, dac with known constants, or jtau)"));
+    };
+    let mut plant = model.plant()?;
+    let mut sensors = Sensors::new(model, run.period_s());
+    if let Some(joints) = run.joints.as_ref().filter(|_| model.as_raven().is_some()) {
+        sensors.use_tool_of(&joints[0]);
+    }
+    let gears = gears(&plant);
+    let parts = (run.period_s() / plant.step_s() - 1e-9).ceil().max(1.0) as usize;
+    let held = Held::new(run, torque, options.hold, parts);
+    let timed = is_timed(model);
+    let mut state = State::ZERO;
+    let mut next_start_s = f64::NEG_INFINITY;
+    let mut out = Simulated::new(model.joint_count(), run.len());
+    for row in 0..run.len() {
+        let time_s = run.time_s[row] - run.time_s[0];
+        if timed {
+            plant.at(time_s);
+        }
+        if time_s >= next_start_s - 1e-9 {
+            state = start(&mut plant, &sensors, run, row, &state);
+            next_start_s = time_s + options.window_s;
+        }
+        out.push(run.time_s[row], &sensors.see(&state, time_s), &torque[row]);
+        let Some(next_s) = run.time_s.get(row + 1) else { break };
+        let part_s = (next_s - run.time_s[row]) / held.parts() as f64;
+        for part in 0..held.parts() {
+            let mut applied = held.at(row, part);
+            applied.iter_mut().zip(&gears).for_each(|(torque, gear)| *torque *= gear);
+            plant.advance(&mut state, &applied, part_s);
+        }
+    }
+    Ok(out)
+}
+
+/// Shaft to capstan, per joint.
+pub(super) fn gears(plant: &Plant) -> Vector {
+    std::array::from_fn(|i| if i < plant.joints() { plant.drive(i).gear } else { 1.0 })
+}
+
+fn start(plant: &mut Plant, sensors: &Sensors, run: &Run, row: usize, before: &State) -> State {
+    let (motors, speeds) = run.state_at(row).unwrap_or(([0.0; JOINTS_MAX], [0.0; JOINTS_MAX]));
+    let mut state = plant.at_rest_with(&sensors.from_encoders(&motors), &before.memories);
+    let n = plant.joints();
+    state.speeds[..n].copy_from_slice(&speeds[..n]);
+    state.rates = sensors.joints_of(&speeds, false);
+    plant.follow(&mut state);
+    state
+}

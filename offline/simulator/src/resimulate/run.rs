@@ -1,0 +1,198 @@
+//! The columns of a recording that a simulation starts from.
+
+use recordings::Recording;
+
+use super::ResimulateError;
+use crate::any_arm::Sensors;
+use crate::model::{Connection, RobotModel};
+use crate::plant::{JOINTS_MAX, Vector, inverse};
+
+/// One number per joint and row; joints beyond the robot's are 0.
+type Rows = Vec<Vector>;
+
+/// A recording of an arm, in SI units; what it does not have is none.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Run {
+    /// Where it came from, for messages.
+    pub name: String,
+    /// Time of every row, s, rising.
+    pub time_s: Vec<f64>,
+    /// Commanded joints, rad and m.
+    pub joints_d: Option<Rows>,
+    /// Motor angles as encoders show them, rad.
+    pub motors: Option<Rows>,
+    /// Motor speeds, rad/s.
+    pub speeds: Option<Rows>,
+    /// Motor torque at the shaft, N·m; where a force acts on the joint itself, that.
+    pub torque: Option<Rows>,
+    /// Joints as the controller reports them, rad and m.
+    pub joints: Option<Rows>,
+    /// Joints as measured at the joints; NaN where there was no measurement.
+    pub true_joints: Option<Rows>,
+}
+
+impl Run {
+    /// From a tidy recording of the robot.
+    ///
+    /// Torque is `tau_J_nm`, else `dac_J_counts` by the drive's constants, else the joint-side `jtau_J` through the coupling.
+    /// Motors are `mpos_J_rad`, else the reported joints through the coupling.
+    ///
+    /// # Errors
+    /// [`ResimulateError`] where there is no time or nothing of the robot's joints.
+    pub fn from_recording(recording: &Recording, model: &RobotModel) -> Result<Self, ResimulateError> {
+        let refuse = |what: String| ResimulateError::Run { recording: recording.name.clone(), what };
+        let time_s = recording.time_s().ok_or_else(|| refuse("has no t_s; a run needs the time of its rows".to_owned()))?.to_vec();
+        if time_s.len() < 2 {
+            return Err(refuse("has fewer than two rows".to_owned()));
+        }
+        let columns = Columns { recording, model };
+        let mut run = Self { name: recording.name.clone(), time_s, ..Self::default() };
+        run.joints_d = columns.joints("jpos_d");
+        run.joints = columns.joints("jpos");
+        run.true_joints = columns.joints("truth_jpos");
+        run.motors = columns.motors("mpos", "rad").or_else(|| columns.motors_of_joints(run.joints.as_ref()?));
+        run.speeds = columns.motors("mvel", "rad_s");
+        run.torque = columns.torque();
+        if run.joints_d.is_none() && run.motors.is_none() && run.torque.is_none() && run.true_joints.is_none() {
+            let kinds = model.joint_kinds();
+            let unit = kinds[0].position_unit();
+            return Err(refuse(format!("has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm")));
+        }
+        Ok(run)
+    }
+
+    /// Rows.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Has it no row?
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Median time between two rows, s.
+    pub fn period_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(1e-3)
+    }
+
+    /// Some of its rows.
+    #[must_use]
+    pub fn part(&self, rows: std::ops::Range<usize>) -> Self {
+        let cut = |column: &Option<Rows>| column.as_ref().map(|values| values[rows.clone()].to_vec());
+        Self {
+            name: self.name.clone(),
+            time_s: self.time_s[rows.clone()].to_vec(),
+            joints_d: cut(&self.joints_d),
+            motors: cut(&self.motors),
+            speeds: cut(&self.speeds),
+            torque: cut(&self.torque),
+            joints: cut(&self.joints),
+            true_joints: cut(&self.true_joints),
+        }
+    }
+
+    /// Motors and their speeds at a row; speeds that were not recorded are differences over some rows.
+    pub(super) fn state_at(&self, row: usize) -> Option<(Vector, Vector)> {
+        /// Rows on either side: a difference of encoder steps over a millisecond is mostly noise.
+        const REACH: usize = 5;
+        let motors = self.motors.as_ref()?;
+        let speeds = match &self.speeds {
+            Some(speeds) => speeds[row],
+            None => {
+                let (before, after) = (row.saturating_sub(REACH), (row + REACH).min(motors.len() - 1));
+                let span_s = self.time_s[after] - self.time_s[before];
+                std::array::from_fn(|i| if span_s > 0.0 { (motors[after][i] - motors[before][i]) / span_s } else { 0.0 })
+            }
+        };
+        Some((motors[row], speeds))
+    }
+
+    pub(super) fn missing(&self, column: &str, why: &'static str) -> ResimulateError {
+        ResimulateError::Column { recording: self.name.clone(), column: column.to_owned(), why }
+    }
+}
+
+struct Columns<'a> {
+    recording: &'a Recording,
+    model: &'a RobotModel,
+}
+
+impl Columns<'_> {
+    /// A joint's column for every joint that has dynamics, and for those further ones that the recording has.
+    fn joints(&self, quantity: &str) -> Option<Rows> {
+        let kinds = self.model.joint_kinds();
+        self.rows(|joint| kinds.get(joint).map(|kind| format!("{quantity}_{}_{}", joint + 1, kind.position_unit())))
+    }
+
+    fn motors(&self, quantity: &str, unit: &str) -> Option<Rows> {
+        let drives = self.model.drives();
+        // A joint that a force acts on has no motor: its own position stands for it.
+        self.rows(|joint| {
+            let direct = drives.get(joint).is_some_and(|drive| drive.connection == Connection::Force);
+            let (quantity, unit) = match (direct, unit) {
+                (false, unit) => (quantity, unit),
+                (true, "rad") => ("jpos", self.model.joint_kinds()[joint].position_unit()),
+                (true, _) => ("jvel", if self.model.joint_kinds()[joint].is_prismatic() { "m_s" } else { "rad_s" }),
+            };
+            Some(format!("{quantity}_{}_{unit}", joint + 1))
+        })
+    }
+
+    fn motors_of_joints(&self, joints: &Rows) -> Option<Rows> {
+        let (sensors, coupling) = (Sensors::new(self.model, 1e-3), self.model.coupling());
+        Some(joints.iter().map(|joints| sensors.motors_for(joints, &coupling)).collect())
+    }
+
+    fn torque(&self) -> Option<Rows> {
+        let drives = self.model.drives();
+        let direct = |joint: usize| drives.get(joint).is_some_and(|drive| drive.connection == Connection::Force);
+        let jtau = |joint: usize| format!("jtau_{}_{}", joint + 1, self.model.joint_kinds()[joint].effort_unit());
+        let shaft = self.rows(|joint| {
+            (joint < drives.len()).then(|| if direct(joint) { jtau(joint) } else { format!("tau_{}_nm", joint + 1) })
+        });
+        shaft.or_else(|| self.torque_of_counts()).or_else(|| self.torque_of_joints())
+    }
+
+    fn torque_of_counts(&self) -> Option<Rows> {
+        let drives = self.model.drives();
+        if drives.iter().any(|drive| drive.torque_per_count_nm() == 0.0) {
+            return None;
+        }
+        let mut rows = self.rows(|joint| (joint < drives.len()).then(|| format!("dac_{}_counts", joint + 1)))?;
+        for row in &mut rows {
+            row.iter_mut().zip(&drives).for_each(|(value, drive)| *value *= drive.torque_per_count_nm());
+        }
+        Some(rows)
+    }
+
+    fn torque_of_joints(&self) -> Option<Rows> {
+        let (drives, n) = (self.model.drives(), self.model.joint_count());
+        let kinds = self.model.joint_kinds();
+        let joint_side = self.rows(|joint| (joint < n).then(|| format!("jtau_{}_{}", joint + 1, kinds[joint].effort_unit())))?;
+        let mut coupling = [[0.0; JOINTS_MAX]; JOINTS_MAX];
+        for (row, given) in coupling.iter_mut().zip(self.model.coupling()) {
+            row[..n].copy_from_slice(&given);
+        }
+        let inverse = inverse(&coupling, n)?;
+        let of_row = |tau: &Vector| {
+            let motor = |i: usize| (0..n).map(|k| inverse[k][i] * tau[k]).sum::<f64>() / drives[i].reduction;
+            std::array::from_fn(|i| if i < n { motor(i) } else { 0.0 })
+        };
+        Some(joint_side.iter().map(of_row).collect())
+    }
+
+    /// Rows of columns by joint: all that have dynamics, or nothing.
+    fn rows(&self, name: impl Fn(usize) -> Option<String>) -> Option<Rows> {
+        let all = self.model.joint_kinds().len().min(JOINTS_MAX);
+        let columns: Vec<Option<&[f64]>> = (0..all).map(|joint| self.recording.column(&name(joint)?)).collect();
+        let n = self.model.joint_count();
+        if columns[..n].iter().any(Option::is_none) {
+            return None;
+        }
+        let row = |row: usize| std::array::from_fn(|joint| columns.get(joint).copied().flatten().map_or(0.0, |values| values[row]));
+        Some((0..self.recording.rows()).map(row).collect())
+    }
+}
