@@ -160,7 +160,15 @@ fn parameter(measure: &Measure, effect: &Effect, verdict: &Verdict) -> Option<Pa
     let (mut off, mut size, mut covered, mut disowned) = (0.0, 0.0, true, false);
     for name in measure.names {
         let truth = effect.parameters.get(*name)?;
-        let said = verdict.parameters.iter().find(|parameter| &parameter.name == name)?;
+        let Some(said) = verdict.parameters.iter().find(|parameter| &parameter.name == name) else {
+            if !measure.told_by_silence {
+                return None;
+            }
+            off += (measure.neutral - truth).powi(2);
+            size += (truth - measure.neutral).powi(2);
+            covered = false;
+            continue;
+        };
         off += (said.value - truth).powi(2);
         size += (truth - measure.neutral).powi(2);
         covered &= said.ci95[0] <= *truth && *truth <= said.ci95[1];

@@ -35,10 +35,16 @@ pub struct Measure {
     pub names: &'static [&'static str],
     /// Value that means no effect.
     pub neutral: f64,
+    /// A report that leaves it out says neutral by that; otherwise it is not judged then.
+    pub told_by_silence: bool,
 }
 
 const fn about(neutral: f64, names: &'static [&'static str]) -> Measure {
-    Measure { names, neutral }
+    Measure { names, neutral, told_by_silence: false }
+}
+
+const fn part(names: &'static [&'static str]) -> Measure {
+    Measure { names, neutral: 0.0, told_by_silence: true }
 }
 
 /// What says how large an effect is. Shapes (exponents, phases, periods) are judged apart.
@@ -59,10 +65,10 @@ pub fn measures(physics: &str) -> &'static [Measure] {
         "joint_offset" => const { &[about(0.0, &["o"])] },
         "transmission_ratio" => const { &[about(0.0, &["e"])] },
         "pulley_eccentricity" => const { &[about(0.0, &["e_over_r"])] },
-        "link_geometry" => const { &[about(0.0, &["d_alpha"]), about(0.0, &["d_length"])] },
+        "link_geometry" => const { &[part(&["d_alpha"]), part(&["d_length"])] },
         "measurement_delay" => const { &[about(0.0, &["d"])] },
-        "frame_misalignment" => const { &[about(0.0, &["w_x", "w_y", "w_z"]), about(0.0, &["t_x", "t_y", "t_z"])] },
-        "external_contact" => const { &[about(0.0, &["f_max"])] },
+        "frame_misalignment" => const { &[part(&["w_x", "w_y", "w_z"]), part(&["t_x", "t_y", "t_z"])] },
+        "external_contact" => const { &[about(0.0, &["f_max"]), about(0.0, &["k"])] },
         "thermal_drift" => const { &[about(0.0, &["kappa_T"])] },
         _ => &[],
     }

@@ -180,6 +180,28 @@ fn coupling_names_two_joints_and_geometry_either_side() {
 }
 
 #[test]
+fn vectors_and_what_is_left_out() {
+    let folder = Folder::new("vectors");
+    let turned = json!({"w_x": 0.003, "w_y": 0.0, "w_z": 0.004, "t_x": 0.001, "t_y": 0.0, "t_z": 0.0});
+    let effect = json!({"physics": "frame_misalignment", "parameters": turned, "severity_wanted": 1.0, "severity": 1.0});
+    let scale = json!({"physics": "motor_torque_scale", "joint": 1, "joint_name": "shoulder", "parameters": {"kappa": 0.8}, "severity_wanted": 1.0, "severity": 1.0});
+    folder.seal("a", &truth("a", "single", &json!([effect])));
+    folder.seal("b", &truth("b", "single", &json!([scale])));
+    let say = |name: &str, value: f64| json!({"name": name, "value": value, "ci95": [value - 0.002, value + 0.002], "identifiable": "yes"});
+    // off by 0.001 in a turn of 0.005; the shift is not stated, so it is said to be none
+    let said = json!([say("w_x", 0.003), say("w_y", 0.001), say("w_z", 0.004)]);
+    folder.answer("a", &report("explained", &[verdict(1, "frame_misalignment", &[], 0.9, &said, &[])]));
+    folder.answer(
+        "b",
+        &report("explained", &[verdict(1, "motor_torque_scale", &["shoulder"], 0.9, &json!([say("kappa", 0.82)]), &[])]),
+    );
+    let judged = folder.score().judged;
+    let errors: Vec<(f64, bool)> = judged.iter().flat_map(|case| &case.parameters).map(|p| (p.error, p.covered)).collect();
+    let wanted = [(0.2, true), (1.0, false), (0.1, false)];
+    assert!(errors.len() == 3 && errors.iter().zip(wanted).all(|(a, b)| (a.0 - b.0).abs() < 1e-9 && a.1 == b.1), "{errors:?}");
+}
+
+#[test]
 fn stretch_of_time() {
     let folder = Folder::new("time");
     let mut effect = coulomb(2.0, 3.0);
