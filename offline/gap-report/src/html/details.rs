@@ -1,5 +1,6 @@
 //! What is folded: runs, method, where everything came from.
 
+use super::effect::alternatives;
 use super::tags::{around, folded, list, table, text};
 use crate::text::{as_given, capital, count, duration, percent, short, significance};
 use crate::{Evidence, Level, Report, Run, RunRole, Verdict, quality_headline};
@@ -10,6 +11,7 @@ pub(super) fn details(report: &Report) -> String {
     let parts = [
         folded("Runs", &runs(report)),
         folded("Checks of the data that were passed", &list("ul", checks)),
+        folded("Alternatives in numbers", &alternatives(report)),
         folded("Method and evidence", &method(report)),
         folded("Where this comes from", &provenance(report)),
     ];

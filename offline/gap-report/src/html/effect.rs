@@ -1,10 +1,10 @@
 //! One section per effect: how it shows, what its correction gains, its parameters, what it may be confused with.
 
 use super::fits::fit;
-use super::tags::{HALF_PX, around, figure, folded, list, section, table, text};
+use super::tags::{HALF_PX, around, figure, list, section, table, text};
 use crate::figures::{before_after, channel_title, signature, spectrum};
 use crate::text::{Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, short};
-use crate::{Confusable, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
+use crate::{Confusable, Evidence, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
 
 /// All effects.
 pub(super) fn effects(report: &Report, pictures: &Pictures) -> String {
@@ -34,6 +34,9 @@ fn effect(report: &Report, verdict: &Verdict, pictures: &Pictures, several: bool
     let parameters = parameters(&verdict.physics, &verdict.parameters);
     let parameters = if parameters.is_empty() { parameters } else { text("h3", "", "How much") + &parameters };
     out += &columns(&[fits, parameters]);
+    if !verdict.physics.is_named() {
+        out += &list("ul", verdict.evidence.iter().map(claim));
+    }
     out += &doubts(report, verdict);
     section(&heading, &out)
 }
@@ -42,6 +45,11 @@ fn run_before_after(picture: &crate::BeforeAfter) -> String {
     // Both widths hold as many figures.
     let count = before_after(picture, HALF_PX).len();
     (0..count).map(|i| figure(|width| before_after(picture, width).swap_remove(i), HALF_PX)).collect()
+}
+
+/// What a test shows, with its figure: all there is to say on what has no name.
+fn claim(test: &Evidence) -> String {
+    format!("{} ({}: {} {}).", capital(&test.claim), test.test, short(test.statistic), test.statistic_name)
 }
 
 /// `On held-out data (run-04, run-05)`.
@@ -72,7 +80,7 @@ fn place(verdict: &Verdict) -> String {
         said.push(format!("{}{share}.", capital(&regime.condition)));
     }
     for stretch in &location.time_intervals {
-        said.push(format!("{}, from {:.1} to {:.1} s.", capital(&stretch.run), stretch.start_s, stretch.end_s));
+        said.push(format!("In {}, from {:.1} to {:.1}\u{a0}s.", stretch.run, stretch.start_s, stretch.end_s));
     }
     text("p", "", &said.join(" "))
 }
@@ -167,12 +175,14 @@ pub(super) fn left_over(report: &Report, pictures: &Pictures) -> String {
     let spectra: String = spectra.map(|picture| figure(|width| spectrum(picture, width), HALF_PX)).collect();
     out += &columns(&[together, spectra]);
     out += &remaining.fit.iter().flatten().map(fit).collect::<String>();
-    let alternatives: String = report.verdicts.iter().filter(|verdict| !verdict.is_primary()).map(alternative).collect();
-    out += &folded("Alternatives in numbers", &alternatives);
     section("All corrections together", &out)
 }
 
-fn alternative(verdict: &Verdict) -> String {
-    let heading = format!("{}: {}", capital(verdict.physics.plain()), probability(verdict.probability));
-    text("h3", "", &heading) + &parameters(&verdict.physics, &verdict.parameters)
+/// What competes with the verdicts, in numbers.
+pub(super) fn alternatives(report: &Report) -> String {
+    let one = |verdict: &Verdict| {
+        let heading = format!("{}: {}", capital(verdict.physics.plain()), probability(verdict.probability));
+        text("h3", "", &heading) + &parameters(&verdict.physics, &verdict.parameters)
+    };
+    report.verdicts.iter().filter(|verdict| !verdict.is_primary()).map(one).collect()
 }

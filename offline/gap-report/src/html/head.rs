@@ -1,8 +1,8 @@
 //! The top: what was compared, the answer in words, the figures that matter.
 
 use super::tags::{around, text};
-use crate::text::{as_given, capital, headlines_unbroken, joined, percent, probability, short, written};
-use crate::{Fit, Level, Physics, Report, Status};
+use crate::text::{as_given, capital, duration, headlines_unbroken, joined, percent, probability, short, written};
+use crate::{Fit, Level, Physics, Report, RunRole, Status};
 
 /// What was compared, the answer's mark and its sentences.
 pub(super) fn head(report: &Report) -> String {
@@ -16,7 +16,9 @@ pub(super) fn head(report: &Report) -> String {
     out += &text("p", &format!("chip {class}"), &mark);
     let mut sentences = headlines_unbroken(report).into_iter();
     out += &text("h1", "", &sentences.next().unwrap_or_default());
-    for sentence in sentences {
+    // Without a verdict the box with the failures follows and says why.
+    let said_below = report.status == Status::InsufficientData && report.quality(Level::Fail).next().is_some();
+    for sentence in sentences.filter(|_| !said_below) {
         out += &text("p", "lead", &sentence);
     }
     if report.told().any(|verdict| !verdict.parameters.is_empty()) {
@@ -38,6 +40,9 @@ fn chip(report: &Report) -> (&'static str, String) {
 
 /// The figures that matter, on tiles.
 pub(super) fn tiles(report: &Report) -> String {
+    if report.status == Status::InsufficientData {
+        return String::new();
+    }
     let mut tiles: Vec<Tile> = Vec::new();
     let first = report.told().next();
     let together = report.remaining.fit.iter().flatten().next();
@@ -54,20 +59,27 @@ pub(super) fn tiles(report: &Report) -> String {
     }
     let resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);
     if let Some(effect) = resolution.filter_map(|test| test.effect.as_ref()).next() {
-        tiles.push(Tile::new("Would have been seen", as_given(effect.value, &effect.unit), "smallest effect"));
+        tiles.push(Tile::new("Visible from", as_given(effect.value, &effect.unit), "less would not show"));
     }
     if let Some(verdict) = first {
         let set = verdict.set_probability.filter(|set| *set > verdict.probability);
         let set = set.map_or_else(String::new, |set| format!("{} with its look-alikes", probability(set)));
         tiles.push(Tile::new("Confidence", probability(verdict.probability), &set));
     }
-    let failures = report.quality(Level::Fail).count();
-    if failures > 0 {
-        tiles.push(Tile::new("Checks of the data", format!("{failures} failed"), ""));
-    }
-    let runs = format!("{} of {}", report.held_out().count(), report.inputs.runs.len());
-    tiles.push(Tile::new("Runs held out", runs, "not used for fitting"));
+    tiles.push(Tile::new("Held out", held_out(report), "not used for fitting"));
     around("dl", "tiles", &tiles.iter().map(Tile::html).collect::<String>())
+}
+
+/// `2 of 5 runs`, or of a split run `9.6 s of 30 s`.
+fn held_out(report: &Report) -> String {
+    let runs = &report.inputs.runs;
+    if runs.iter().any(|run| run.role == RunRole::HeldOut) {
+        return format!("{} of {} runs", report.held_out().count(), runs.len());
+    }
+    let stretches = runs.iter().filter_map(|run| run.held_out_interval.as_ref());
+    let held_out: f64 = stretches.map(|stretch| stretch.end_s - stretch.start_s).sum();
+    let all: f64 = runs.iter().map(|run| run.duration_s).sum();
+    if held_out > 0.0 { format!("{} of {}", duration(held_out), duration(all)) } else { "nothing".to_owned() }
 }
 
 /// A name, a figure, and what to compare it with.

@@ -27,7 +27,7 @@ pub(super) fn place(report: &Report, pictures: &Pictures) -> String {
     }
     out += &shares(report, pictures);
     out += &sizes(report);
-    section("Where it is", &out)
+    section(if report.mismatch.detected { "Where it is" } else { "What was compared" }, &out)
 }
 
 /// Bars of the excess energy: those of the engine, otherwise those in the verdicts.
@@ -59,7 +59,7 @@ fn from_verdicts(report: &Report) -> Vec<Share> {
     let share = |verdict: &crate::Verdict| {
         let location = &verdict.location;
         let (channel, share) = (location.channel, location.energy_share?);
-        let joint = format!("{}, {}", channel_title(channel), joints(&location.joint));
+        let joint = format!("{}, {}", channel_title(channel), joints(&location.joint).trim_start_matches("the "));
         Some(Share { channel, joint, regime: String::new(), share })
     };
     report.told().filter_map(share).collect()

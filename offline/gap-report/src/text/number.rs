@@ -37,12 +37,12 @@ pub(crate) fn as_given(value: f64, unit: &str) -> String {
     joined(&short(value), &written(unit))
 }
 
-/// Number and unit; no space before degrees.
+/// Number and unit, not to be broken between lines; no space before degrees.
 pub(crate) fn joined(number: &str, unit: &str) -> String {
     match unit {
         "" => number.to_owned(),
         "°" => format!("{number}°"),
-        unit => format!("{number}\u{a0}{unit}"),
+        unit => format!("{number}\u{a0}{}", unit.replace(' ', "\u{a0}")),
     }
 }
 
