@@ -31,7 +31,16 @@ fn cases() -> Vec<Case> {
     let plant = Robot::nominal().raven.plant().clone();
     let stiffness = (0..3).map(|i| 2.0 * plant.cable.ke_n[i] * plant.cable.joint_radius_m[i].powi(2)).collect();
     let pairs = vec![Bound::Pair(1, 0), Bound::Pair(2, 1), Bound::Pair(5, 4)];
-    common::cases::all(&Places { joints: 7, stiffness, pairs, heavy_links: 3, links: 6, ripple: 0.5, coulomb: 0.8, contact_x_m: -0.2 })
+    common::cases::all(&Places {
+        joints: 7,
+        stiffness,
+        pairs,
+        heavy_links: 3,
+        links: 6,
+        ripple: 0.5,
+        coulomb: 0.8,
+        contact_x_m: -0.2,
+    })
 }
 
 /// Largest differences of two runs: true joints, reported joints, torque, tip.

@@ -32,9 +32,16 @@ pub(crate) struct Seen {
 /// The way from joints to the tip, as believed and as it is.
 #[derive(Debug, Clone)]
 enum Chain {
-    Serial { believed: Box<SerialArm>, truth: Box<SerialArm>, workspace: Workspace },
+    Serial {
+        believed: Box<SerialArm>,
+        truth: Box<SerialArm>,
+        workspace: Workspace,
+    },
     /// With the joints of the tool, which this plant does not have.
-    Raven { believed: Box<Arm>, truth: Box<Arm> },
+    Raven {
+        believed: Box<Arm>,
+        truth: Box<Arm>,
+    },
 }
 
 /// The instruments of a robot.
@@ -70,10 +77,9 @@ impl Sensors {
             drives.get(i).map_or(0.0, |drive| drive.reduction * (0..n).map(|j| coupling[i][j] * joint_offset[j]).sum::<f64>())
         });
         let chain = match (model.as_raven(), model.as_urdf()) {
-            (Some(raven), _) => Chain::Raven {
-                believed: Box::new(raven.raven.arm(model.side())),
-                truth: Box::new(true_arm(raven, model.side())),
-            },
+            (Some(raven), _) => {
+                Chain::Raven { believed: Box::new(raven.raven.arm(model.side())), truth: Box::new(true_arm(raven, model.side())) }
+            }
             (_, urdf) => {
                 let believed = model.arm();
                 let truth = urdf.map_or_else(|| believed.clone(), crate::model::UrdfRobot::true_arm);

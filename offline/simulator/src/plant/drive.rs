@@ -319,9 +319,11 @@ impl Drive {
     /// Capstan torque that must be commanded for one to act, N·m: the inverse of [`Self::applied`].
     pub(crate) fn commanded(&self, acting_nm: f64) -> f64 {
         let per_count = self.nominal.torque_per_count_nm;
-        self.scale.iter().rev().filter(|scale| scale.on).fold(acting_nm, |torque, scale| {
-            torque / scale.effect.kappa + scale.effect.d_0 * per_count
-        })
+        self.scale
+            .iter()
+            .rev()
+            .filter(|scale| scale.on)
+            .fold(acting_nm, |torque, scale| torque / scale.effect.kappa + scale.effect.d_0 * per_count)
     }
 
     /// What of the Coulomb friction is left as the motor is warm.

@@ -168,7 +168,11 @@ impl Plant {
             if missing.abs() <= close {
                 break;
             }
-            if missing > 0.0 { low = at } else { high = at }
+            if missing > 0.0 {
+                low = at
+            } else {
+                high = at
+            }
             let mut next = at + missing / cable.stiffness.max(1e-9);
             if cable.torque == 0.0 {
                 // Inside a dead band: to its end first.

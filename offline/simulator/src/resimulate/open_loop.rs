@@ -30,7 +30,9 @@ impl Default for OpenLoop {
 /// [`ResimulateError`] without torque, and for effects that cannot be where they are.
 pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Simulated, ResimulateError> {
     let Some(torque) = &run.torque else {
-        return Err(run.missing("tau_1_nm", "an open loop needs the torque of every motor (tau, dac with known constants, or jtau)"));
+        return Err(
+            run.missing("tau_1_nm", "an open loop needs the torque of every motor (tau, dac with known constants, or jtau)")
+        );
     };
     let mut plant = model.plant()?;
     let mut sensors = Sensors::new(model, run.period_s());

@@ -1,8 +1,9 @@
 //! The columns of a recording that a simulation starts from.
 
+use arm::Motors;
 use recordings::Recording;
 
-use super::ResimulateError;
+use super::{Commands, ResimulateError};
 use crate::any_arm::Sensors;
 use crate::model::{Connection, RobotModel};
 use crate::plant::{JOINTS_MAX, Vector, inverse};
@@ -56,7 +57,9 @@ impl Run {
         if run.joints_d.is_none() && run.motors.is_none() && run.torque.is_none() && run.true_joints.is_none() {
             let kinds = model.joint_kinds();
             let unit = kinds[0].position_unit();
-            return Err(refuse(format!("has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm")));
+            return Err(refuse(format!(
+                "has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm"
+            )));
         }
         Ok(run)
     }
@@ -108,6 +111,18 @@ impl Run {
             }
         };
         Some((motors[row], speeds))
+    }
+
+    /// Motors and speeds in which a RAVEN-II begins the run; tool motors that were not recorded where their commands want them.
+    pub fn start_of_raven(&self, model: &RobotModel, commands: &Commands) -> Option<(Motors, Motors)> {
+        let (motors, speeds) = self.state_at(0)?;
+        let arm = model.as_raven()?.raven.arm(model.side());
+        let mut start = arm.transmission.motors(&std::array::from_fn(|i| commands.first()[i]));
+        let n = model.joint_count();
+        let has_tool = motors[n..].iter().any(|angle| *angle != 0.0);
+        let known = if has_tool { start.len() } else { n };
+        start[..known].copy_from_slice(&motors[..known]);
+        Some((start, std::array::from_fn(|i| speeds[i])))
     }
 
     pub(super) fn missing(&self, column: &str, why: &'static str) -> ResimulateError {

@@ -80,11 +80,7 @@ pub(crate) fn all(places: &Places) -> Vec<Case> {
         case("link_geometry", &[], &[("d_alpha", 0.01), ("d_length", 0.003)], (0..places.links).map(Bound::Link).collect()),
         case("measurement_delay", &[], &[("d", 0.02)], Channel::NAMES.map(|(_, channel)| Bound::Channel(channel)).to_vec()),
         case("frame_misalignment", &[], &[("w_z", 0.02), ("t_x", 0.004)], vec![Bound::Robot]),
-        Case {
-            none: contact(1000.0, 10.0),
-            some: contact(1000.0, places.contact_x_m),
-            bounds: vec![Bound::Robot],
-        },
+        Case { none: contact(1000.0, 10.0), some: contact(1000.0, places.contact_x_m), bounds: vec![Bound::Robot] },
         case("thermal_drift", &[("kappa_T", 0.0), ("T", 1.0)], &[("kappa_T", 0.5), ("T", 1.0)], joints()),
     ];
     // The element takes the place of the cable: without memory (a = 1) it is that cable.
