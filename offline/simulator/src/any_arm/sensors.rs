@@ -105,7 +105,7 @@ impl Sensors {
     }
 
     /// Angles counted from joint 0, as the plant has them, for angles as encoders show them.
-    pub(crate) fn from_encoders(&self, motors: &Vector) -> Vector {
+    pub(crate) fn counted_from_zero(&self, motors: &Vector) -> Vector {
         std::array::from_fn(|i| motors[i] + self.zero[i])
     }
 
@@ -157,7 +157,6 @@ impl Sensors {
             motors.copy_from_slice(&late[..JOINTS_MAX]);
             speeds.copy_from_slice(&late[JOINTS_MAX..]);
         }
-        self.quantise(&mut motors);
         if self.stepped {
             self.quantise(&mut motors);
         }

@@ -27,7 +27,9 @@ impl Commands {
             let has_tool = commands.iter().any(|row| row[n..].iter().any(|value| *value != 0.0));
             if !has_tool {
                 let home = &robot.raven.plant().limits.home;
-                rows.iter_mut().for_each(|row| row[n..home.len()].copy_from_slice(&home[n..]));
+                for row in &mut rows {
+                    row[n..home.len()].copy_from_slice(&home[n..]);
+                }
             }
         }
         Ok(Self { time_s: run.time_s.clone(), rows })

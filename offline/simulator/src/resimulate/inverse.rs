@@ -85,7 +85,7 @@ pub fn inverse(model: &RobotModel, motion: &Motion) -> Result<Simulated, Resimul
             plant.at(time_s);
         }
         let position = match motion.given {
-            Given::Motors => sensors.from_encoders(&motion.positions[row]),
+            Given::Motors => sensors.counted_from_zero(&motion.positions[row]),
             Given::Joints => motion.positions[row],
         };
         let parts = [&position, &motion.rates[row], &motion.accelerations[row]];

@@ -74,7 +74,7 @@ pub(super) fn gears(plant: &Plant) -> Vector {
 
 fn start(plant: &mut Plant, sensors: &Sensors, run: &Run, row: usize, before: &State) -> State {
     let (motors, speeds) = run.state_at(row).unwrap_or(([0.0; JOINTS_MAX], [0.0; JOINTS_MAX]));
-    let mut state = plant.at_rest_with(&sensors.from_encoders(&motors), &before.memories);
+    let mut state = plant.at_rest_with(&sensors.counted_from_zero(&motors), &before.memories);
     let n = plant.joints();
     state.speeds[..n].copy_from_slice(&speeds[..n]);
     state.rates = sensors.joints_of(&speeds, false);

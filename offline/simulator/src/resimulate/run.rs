@@ -51,7 +51,7 @@ impl Run {
         run.joints_d = columns.joints("jpos_d");
         run.joints = columns.joints("jpos");
         run.true_joints = columns.joints("truth_jpos");
-        run.motors = columns.motors("mpos", "rad").or_else(|| columns.motors_of_joints(run.joints.as_ref()?));
+        run.motors = columns.motors("mpos", "rad").or_else(|| Some(columns.motors_of_joints(run.joints.as_ref()?)));
         run.speeds = columns.motors("mvel", "rad_s");
         run.torque = columns.torque();
         if run.joints_d.is_none() && run.motors.is_none() && run.torque.is_none() && run.true_joints.is_none() {
@@ -102,13 +102,12 @@ impl Run {
         /// Rows on either side: a difference of encoder steps over a millisecond is mostly noise.
         const REACH: usize = 5;
         let motors = self.motors.as_ref()?;
-        let speeds = match &self.speeds {
-            Some(speeds) => speeds[row],
-            None => {
-                let (before, after) = (row.saturating_sub(REACH), (row + REACH).min(motors.len() - 1));
-                let span_s = self.time_s[after] - self.time_s[before];
-                std::array::from_fn(|i| if span_s > 0.0 { (motors[after][i] - motors[before][i]) / span_s } else { 0.0 })
-            }
+        let speeds = if let Some(speeds) = &self.speeds {
+            speeds[row]
+        } else {
+            let (before, after) = (row.saturating_sub(REACH), (row + REACH).min(motors.len() - 1));
+            let span_s = self.time_s[after] - self.time_s[before];
+            std::array::from_fn(|i| if span_s > 0.0 { (motors[after][i] - motors[before][i]) / span_s } else { 0.0 })
         };
         Some((motors[row], speeds))
     }
@@ -156,9 +155,9 @@ impl Columns<'_> {
         })
     }
 
-    fn motors_of_joints(&self, joints: &Rows) -> Option<Rows> {
+    fn motors_of_joints(&self, joints: &Rows) -> Rows {
         let (sensors, coupling) = (Sensors::new(self.model, 1e-3), self.model.coupling());
-        Some(joints.iter().map(|joints| sensors.motors_for(joints, &coupling)).collect())
+        joints.iter().map(|joints| sensors.motors_for(joints, &coupling)).collect()
     }
 
     fn torque(&self) -> Option<Rows> {
