@@ -16,7 +16,7 @@ use std::process::ExitCode;
 pub(super) fn run(wish: &Wish<'_>, model: RobotModel) -> Result<ExitCode, String> {
     let format = wish.format.unwrap_or("mcap");
     if wish.commands.is_empty() {
-        return made(wish, model, format);
+        return made(wish, &model, format);
     }
     match wish.arm {
         "both" => Err("--arm both: a recording's commands are followed by one arm at a time; write --arm gold or green".to_owned()),
@@ -26,7 +26,7 @@ pub(super) fn run(wish: &Wish<'_>, model: RobotModel) -> Result<ExitCode, String
 }
 
 /// Trajectories that the seed decides.
-fn made(wish: &Wish<'_>, model: RobotModel, format: &str) -> Result<ExitCode, String> {
+fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, String> {
     let Some(robot) = model.as_raven().cloned() else { return Err(format!("{}: is no RAVEN-II", model.name())) };
     let plan = Plan {
         robot,
@@ -67,7 +67,7 @@ fn made(wish: &Wish<'_>, model: RobotModel, format: &str) -> Result<ExitCode, St
         text.push('\n');
     }
     let made = format!("{} runs of {:.3} s", runs.len(), runs[0].duration_s);
-    finish(wish, &model, &made, &summary, &text)
+    finish(wish, model, &made, &summary, &text)
 }
 
 fn motion_of(run: Run) -> &'static str {

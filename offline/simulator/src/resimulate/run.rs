@@ -46,6 +46,9 @@ impl Run {
         if time_s.len() < 2 {
             return Err(refuse("has fewer than two rows".to_owned()));
         }
+        if let Some(row) = time_s.windows(2).position(|pair| pair[1] <= pair[0] || !pair[1].is_finite()) {
+            return Err(refuse(format!("its time does not rise after row {}", row + 1)));
+        }
         let columns = Columns { recording, model };
         let mut run = Self { name: recording.name.clone(), time_s, ..Self::default() };
         run.joints_d = columns.joints("jpos_d");
@@ -61,7 +64,13 @@ impl Run {
                 "has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm"
             )));
         }
-        Ok(run)
+        let signals = [&run.joints_d, &run.motors, &run.speeds, &run.torque, &run.joints];
+        let gap =
+            signals.into_iter().flatten().find_map(|rows| rows.iter().position(|row| row.iter().any(|value| !value.is_finite())));
+        match gap {
+            Some(row) => Err(refuse(format!("row {} lacks a command, motor, torque or joint; cut the run there", row + 1))),
+            None => Ok(run),
+        }
     }
 
     /// Rows.
