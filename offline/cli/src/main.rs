@@ -2,6 +2,7 @@
 
 mod check;
 mod convert;
+mod gap;
 mod infer;
 mod info;
 mod output;
@@ -81,6 +82,27 @@ enum Command {
         #[arg(long)]
         same: bool,
     },
+    /// Where a simulation and recordings differ, which physics is missing, how large it is, and the model with it
+    Gap {
+        /// Recordings of one robot, one file per run
+        #[arg(long, required = true, num_args = 1..)]
+        real: Vec<PathBuf>,
+        /// What a simulator made of the same commands, in the same order; without it the robot's model stands for it
+        #[arg(long, num_args = 1..)]
+        sim: Vec<PathBuf>,
+        /// Robot file, URDF, or raven2-nominal (the default)
+        #[arg(long)]
+        robot: Option<String>,
+        /// Folder for report.json, report.html and corrected.toml
+        #[arg(long)]
+        out: PathBuf,
+        /// Of everything random; written into the report
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+        /// Say on standard error what the search tries
+        #[arg(long)]
+        trace: bool,
+    },
     /// Log the running service's states and poses to MCAP, on one clock; a kill loses at most the last second
     Record {
         /// File to write; it stands as NAME.part until the end
@@ -159,6 +181,9 @@ fn main() -> ExitCode {
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
         Command::Pair { run, truth, out, same } => pair::run(&run, truth.as_deref(), &out, same),
+        Command::Gap { real, sim, robot, out, seed, trace } => {
+            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace })
+        }
         Command::Record { out, seconds } => record::run(&out, seconds),
         Command::Simulate { minutes, seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {

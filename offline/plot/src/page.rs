@@ -40,21 +40,13 @@ pub struct Page {
 impl Page {
     /// The file.
     pub fn html(&self) -> String {
-        let title = escape(&self.title);
-        let mut out = format!(
-            "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head><meta charset=\"utf-8\"/>\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/><meta name=\"color-scheme\" content=\"light dark\"/>\
-             <title>{title}</title><style>{}{}</style></head>\n<body><main><header><h1>{title}</h1><p class=\"sub\">{}</p></header>\n",
-            style(),
-            *figure::STYLE,
-            escape(&self.subtitle)
-        );
+        let (title, subtitle) = (escape(&self.title), escape(&self.subtitle));
+        let mut body = format!("<header><h1>{title}</h1><p class=\"sub\">{subtitle}</p></header>\n");
         for block in &self.blocks {
-            write_block(&mut out, block);
-            out.push('\n');
+            body.push_str(&block.html());
+            body.push('\n');
         }
-        out.push_str("</main></body></html>\n");
-        out
+        document(&self.title, "", &body)
     }
 
     /// All figures, titled with the section that they stand in; of those in two widths the first.
@@ -74,6 +66,32 @@ impl Page {
             }
         }
         all
+    }
+}
+
+/// A whole file around a body, which must be well-formed: with the style sheets of pages and figures, then a further one.
+pub fn document(title: &str, further_style: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head><meta charset=\"utf-8\"/>\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/><meta name=\"color-scheme\" content=\"light dark\"/>\
+         <title>{}</title><style>{}{}{further_style}</style></head>\n<body><main>{body}</main></body></html>\n",
+        escape(title),
+        style(),
+        *figure::STYLE,
+    )
+}
+
+/// Colours of a page, light and dark: paper, ink, muted text, lines, and one that warns, as CSS has them.
+pub fn colours() -> [[&'static str; 5]; 2] {
+    figure::page_colours()
+}
+
+impl Block {
+    /// Its part of the page.
+    pub fn html(&self) -> String {
+        let mut out = String::new();
+        write_block(&mut out, self);
+        out
     }
 }
 

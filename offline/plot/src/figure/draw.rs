@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::colour::{DENSITY_LEVELS, HEAT_LEVELS, STYLE};
-use super::layout::{self, BAR, LABEL_CHARACTERS, LINE, Layout, Place, shortened, text_width, titled, wrapped};
-use super::scale::{Axis, ticks};
+use super::layout::{self, BAR, LABEL_CHARACTERS, LINE, Layout, NAME_CHARACTERS, Place, shortened, text_width, titled, wrapped};
+use super::scale::{Axis, Ticks, ticks};
 use super::xml::{coordinate, escape, stroke};
 use super::{Cells, Colour, Figure, Mark, Ramp};
 
@@ -78,22 +78,36 @@ fn drawn(figure: &Figure) -> (String, f64) {
 }
 
 fn x_axis(out: &mut String, figure: &Figure, layout: &Layout<'_>, bottom: f64) {
-    let named = figure.x.categories.iter().enumerate().map(|(i, name)| (i as f64, name));
-    let numbered = layout.x_ticks.values.iter().copied().zip(&layout.x_ticks.labels);
-    let labels: Vec<(f64, &String)> = if figure.x.categories.is_empty() { numbered.collect() } else { named.collect() };
-    for (value, label) in labels {
+    let mut free = f64::NEG_INFINITY;
+    for (value, label) in labels_of(&figure.x, &layout.x_ticks) {
         // The outermost labels stay inside.
         let half = 0.5 * text_width(label);
         let at = (layout.left + layout.x(value)).clamp(half.min(layout.left), figure.width_px - half);
-        text(out, "muted", "middle", at, bottom + 15.0, label);
+        if figure.x.names.is_empty() || at - half >= free {
+            text(out, "muted", "middle", at, bottom + 15.0, label);
+            free = at + half + 8.0;
+        }
     }
-    let title = axis_title(&figure.x, layout.x_ticks.exponent);
-    text(out, "muted", "middle", layout.left + 0.5 * layout.width, bottom + 31.0, &title);
+    let exponent = if figure.x.names.is_empty() { layout.x_ticks.exponent } else { 0 };
+    let title = shortened(&axis_title(&figure.x, exponent), (figure.width_px / layout::CHARACTER) as usize);
+    let half = 0.5 * text_width(&title);
+    let at = (layout.left + 0.5 * layout.width).min(figure.width_px - half).max(half);
+    text(out, "muted", "middle", at, bottom + 31.0, &title);
+}
+
+/// What stands along an axis: names if it has any, otherwise round numbers.
+fn labels_of<'a>(axis: &'a Axis, ticks: &'a Ticks) -> Vec<(f64, &'a String)> {
+    let named = axis.names.iter().map(|(value, name)| (*value, name));
+    let numbered = ticks.values.iter().copied().zip(&ticks.labels);
+    if axis.names.is_empty() { numbered.collect() } else { named.collect() }
 }
 
 fn panel(out: &mut String, figure: &Figure, layout: &Layout<'_>, place: &Place<'_>) {
     let (left, right) = (layout.left, layout.left + layout.width);
-    let title = axis_title(&place.panel.y, place.ticks.exponent);
+    let exponent = if place.panel.y.names.is_empty() { place.ticks.exponent } else { 0 };
+    let taken = place.panel.note.as_ref().map_or(0.0, |note| text_width(note) + 12.0) + figure.width_px - right;
+    let room = if place.panel.marks.iter().any(|mark| mark.bar().is_some()) { f64::INFINITY } else { figure.width_px - taken };
+    let title = shortened(&axis_title(&place.panel.y, exponent), (room / layout::CHARACTER) as usize);
     text(out, "muted", "start", 0.0, place.top - 10.0, &title);
     let mut end = right;
     if let Some((_, bar_title)) = place.panel.marks.iter().find_map(Mark::bar) {
@@ -103,7 +117,7 @@ fn panel(out: &mut String, figure: &Figure, layout: &Layout<'_>, place: &Place<'
     if let Some(note) = &place.panel.note {
         text(out, "muted", "end", end, place.top - 10.0, note);
     }
-    grid(out, layout, place);
+    grid(out, &figure.x, layout, place);
     let (x, y) = (coordinate(left), coordinate(place.top));
     let (w, h) = (coordinate(layout.width), coordinate(place.height));
     // A nested drawing cuts off what lies outside a fixed range.
@@ -130,19 +144,17 @@ fn is_empty(mark: &Mark) -> bool {
     }
 }
 
-fn grid(out: &mut String, layout: &Layout<'_>, place: &Place<'_>) {
+fn grid(out: &mut String, x_axis: &Axis, layout: &Layout<'_>, place: &Place<'_>) {
     let (left, width, bottom) = (layout.left, layout.width, place.top + place.height);
     let mut lines = String::new();
-    let named = place.panel.y.categories.iter().enumerate().map(|(i, name)| (i as f64, name));
-    let numbered = place.ticks.values.iter().copied().zip(&place.ticks.labels);
-    let labels: Vec<(f64, &String)> = if place.panel.y.categories.is_empty() { numbered.collect() } else { named.collect() };
-    for (value, label) in labels {
+    let characters = if place.panel.y.names.is_empty() { 8 } else { NAME_CHARACTERS };
+    for (value, label) in labels_of(&place.panel.y, &place.ticks) {
         let y = place.top + place.y(value);
         let _ = write!(lines, "M{} {}h{}", coordinate(left), coordinate(y), coordinate(width));
-        text(out, "muted", "end", left - 6.0, y + 4.0, &shortened(label, 8));
+        text(out, "muted", "end", left - 6.0, y + 4.0, &shortened(label, characters));
     }
-    for value in &layout.x_ticks.values {
-        let x = left + layout.x(*value);
+    for (value, _) in labels_of(x_axis, &layout.x_ticks) {
+        let x = left + layout.x(value);
         let _ = write!(lines, "M{} {}v{}", coordinate(x), coordinate(place.top), coordinate(place.height));
     }
     let _ = write!(out, "<path class=\"grid\" d=\"{lines}\"/>");
@@ -205,8 +217,9 @@ fn level(value: f64, (low, high): (f64, f64), levels: usize) -> usize {
 
 fn paint(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, cells: &Cells, ramp: Ramp) {
     let (low, high) = cells.range();
-    let (letter, levels) = if ramp == Ramp::Heat { ('h', HEAT_LEVELS) } else { ('d', DENSITY_LEVELS) };
+    let (letter, levels) = if ramp == Ramp::Density { ('d', DENSITY_LEVELS) } else { ('h', HEAT_LEVELS) };
     let of = |value: f64| match ramp {
+        Ramp::Ratio { most } => level(value.max(1.0).ln(), (0.0, most.max(1.0 + 1e-9).ln()), levels),
         Ramp::Heat => level(value, (low, high), levels),
         Ramp::Density => level(value.ln(), (low.ln(), high.ln()), levels),
     };
@@ -254,6 +267,30 @@ fn colour_bar(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, cells: &
         let y = place.top + place.height * (high - value) / (high - low);
         text(out, "muted", "start", left + BAR + 5.0, y + 4.0, label);
     }
+}
+
+/// A legend of [`Ramp::Ratio`] as a drawing of its own, to be put into a page that has [`STYLE`]: noise on the left, `most` times
+/// as much on the right.
+pub fn ratio_legend(most: f64) -> String {
+    const WIDTH: f64 = 320.0;
+    const LEFT: f64 = 40.0;
+    const BAR_WIDTH: f64 = 200.0;
+    let mut out = String::new();
+    let step = BAR_WIDTH / HEAT_LEVELS as f64;
+    for i in 0..HEAT_LEVELS {
+        let (x, w) = (coordinate(LEFT + step * i as f64), coordinate(step + 0.3));
+        let _ = write!(out, "<rect class=\"h{i}\" x=\"{x}\" y=\"2\" width=\"{w}\" height=\"{BAR}\"/>");
+    }
+    text(&mut out, "muted", "end", LEFT - 5.0, 11.0, "noise");
+    let most = if most > 1.0 { most } else { 1.0 + 1e-9 };
+    for value in [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0].into_iter().filter(|value| *value <= most) {
+        let at = LEFT + BAR_WIDTH * f64::ln(value) / most.ln();
+        text(&mut out, "muted", "middle", at, 26.0, &format!("{value}"));
+    }
+    text(&mut out, "muted", "start", LEFT + BAR_WIDTH + 6.0, 11.0, "× noise");
+    let label = format!("Colour scale from noise to {most:.0} times noise");
+    let size = format!("viewBox=\"0 0 {WIDTH} 30\" width=\"{WIDTH}\" height=\"30\"");
+    format!("<svg class=\"rp legend\" {size} role=\"img\" aria-label=\"{label}\">{out}</svg>")
 }
 
 /// Names beside the ends of their lines, moved apart where they would touch.

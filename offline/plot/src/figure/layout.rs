@@ -15,6 +15,8 @@ pub(super) const CHARACTER_TITLE: f64 = 7.6;
 /// Width of a colour bar and its distance from the panel.
 pub(super) const BAR: f64 = 10.0;
 const BAR_GAP: f64 = 10.0;
+/// Characters of a name beside a vertical axis at most.
+pub(super) const NAME_CHARACTERS: usize = 14;
 /// Characters of a label beside a line at most.
 pub(super) const LABEL_CHARACTERS: usize = 16;
 
@@ -67,11 +69,11 @@ impl<'a> Layout<'a> {
             places.push(Place { panel, top, height: panel.height_px, range, ticks: ticks(range.0, range.1, most) });
             top += panel.height_px + 8.0;
         }
-        let labels = places
-            .iter()
-            .flat_map(|place| place.ticks.labels.iter())
-            .chain(figure.panels.iter().flat_map(|panel| &panel.y.categories));
-        let left = (labels.map(|label| text_width(label)).fold(16.0, f64::max) + 9.0).min(MARGIN_LEFT_MAX);
+        let numbers = places.iter().filter(|place| place.panel.y.names.is_empty()).flat_map(|place| &place.ticks.labels);
+        let number_room = (numbers.map(|label| text_width(label)).fold(16.0, f64::max) + 9.0).min(MARGIN_LEFT_MAX);
+        let names = figure.panels.iter().flat_map(|panel| &panel.y.names);
+        let name_room = names.map(|(_, name)| text_width(&shortened(name, NAME_CHARACTERS)) + 9.0);
+        let left = name_room.fold(number_room, f64::max);
         let width = (figure.width_px - left - margin_right(figure)).max(40.0);
         let data = union(figure.panels.iter().flat_map(|panel| panel.marks.iter().map(|mark| mark.extent().0)));
         let x_range = figure.x.span(data, 0.0);

@@ -18,10 +18,15 @@ pub struct Cells {
 }
 
 /// How the values of cells become colours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ramp {
     /// Straight from the least to the greatest, with a colour bar.
     Heat,
+    /// By the logarithm from 1, and below, to `most`, without a bar: see [`super::ratio_legend`]. Equal in all panels.
+    Ratio {
+        /// Value of the last colour.
+        most: f64,
+    },
     /// Shades of grey by the logarithm, without a bar: where the samples are.
     Density,
 }

@@ -21,7 +21,7 @@ mod scale;
 mod xml;
 
 pub use colour::{Colour, HEAT_LEVELS, STYLE};
-pub use draw::{svg, svg_document};
+pub use draw::{ratio_legend, svg, svg_document};
 pub use mark::{Cells, Mark, Ramp};
 pub use scale::{Axis, Ticks, number, ticks};
 pub use xml::escape;

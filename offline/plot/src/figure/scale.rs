@@ -17,14 +17,14 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
     /// Values that the range must include.
     pub including: Vec<f64>,
-    /// Names instead of numbers: the category at 0, 1, 2, ...
-    pub categories: Vec<String>,
+    /// Names instead of numbers, each at its place.
+    pub names: Vec<(f64, String)>,
 }
 
 impl Axis {
     /// An axis whose range follows the data.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), range: None, including: Vec::new(), categories: Vec::new() }
+        Self { title: title.into(), range: None, including: Vec::new(), names: Vec::new() }
     }
 
     /// Fixes the range; limits that are not finite or not rising are passed over.
@@ -47,8 +47,14 @@ impl Axis {
 
     /// Names for 0, 1, 2, ...
     #[must_use]
-    pub fn categories(mut self, names: impl IntoIterator<Item = String>) -> Self {
-        self.categories = names.into_iter().collect();
+    pub fn categories(self, names: impl IntoIterator<Item = String>) -> Self {
+        self.names(names.into_iter().enumerate().map(|(i, name)| (i as f64, name)))
+    }
+
+    /// Names at their places instead of numbers at round ones; where two would touch, the later one is left out.
+    #[must_use]
+    pub fn names(mut self, names: impl IntoIterator<Item = (f64, String)>) -> Self {
+        self.names = names.into_iter().filter(|(value, _)| drawable(*value)).collect();
         self
     }
 

@@ -1,0 +1,41 @@
+//! What a correction gains on held-out runs, as bars.
+
+use super::tags::{around, text};
+use crate::text::{as_given, percent, plain_metric};
+use crate::{Fit, Metric, Space};
+
+/// One figure before, after and by noise alone.
+pub(super) fn fit(fit: &Fit) -> String {
+    let name = format!("{}, {} {}", crate::text::capital(&fit.quantity), plain_metric(fit.metric), plain_space(fit.space));
+    let mut out = text("p", "name", &name);
+    let least_is_best = !matches!(fit.metric, Metric::R2 | Metric::LogLikelihoodPerSample);
+    let most = [fit.before, fit.after].into_iter().chain(fit.noise_floor).fold(0.0_f64, f64::max);
+    let bar = |name: &str, class: &str, value: f64| {
+        let width = if most > 0.0 { (100.0 * value / most).clamp(0.0, 100.0) } else { 0.0 };
+        format!(
+            "{}<span class=\"t\" aria-hidden=\"true\"><i class=\"{class}\" style=\"width:{width:.1}%\"></i></span>{}",
+            text("span", "", name),
+            text("span", "n", &as_given(value, &fit.unit))
+        )
+    };
+    let floor = fit.noise_floor.map_or_else(String::new, |floor| bar("noise alone", "noise", floor));
+    let bars = bar("before", "before", fit.before) + &bar("after", "after", fit.after) + &floor;
+    out += &around("div", "bars", &bars);
+    if let Some(gone) = fit.removed_fraction.filter(|_| least_is_best) {
+        let interval = fit.removed_fraction_ci95.map_or_else(String::new, |[low, high]| {
+            format!(" (95 % interval {} to {})", percent(low).trim_end_matches(['\u{a0}', '%']), percent(high))
+        });
+        out += &text("p", "gone", &format!("{} of the removable error is gone{interval}.", percent(gone)));
+    }
+    out += &text("p", "fine", &format!("Judged on {}.", fit.on.join(", ")));
+    around("div", "fit", &out)
+}
+
+/// What is compared, in words.
+pub(super) fn plain_space(space: Space) -> &'static str {
+    match space {
+        Space::EquationError => "on the recorded motion",
+        Space::ClosedLoop => "with the simulation run again",
+        Space::RecordedOutput => "of the recorded simulation, corrected",
+    }
+}

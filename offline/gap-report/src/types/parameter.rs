@@ -1,0 +1,111 @@
+//! Parameters of a physics.
+
+use serde::{Deserialize, Serialize};
+
+use super::Extra;
+use crate::names::names;
+use crate::{Motion, Physics, vocabulary};
+
+/// A parameter with its interval. Joint side, also where the recording is motor side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Name in the vocabulary.
+    pub name: String,
+    /// Value, in `unit`.
+    pub value: f64,
+    /// Unit of the vocabulary, such as `N.m`.
+    pub unit: String,
+    /// 95 % interval; holds the value.
+    pub ci95: [f64; 2],
+    /// How the interval was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ci_method: Option<CiMethod>,
+    /// Do these data determine it?
+    pub identifiable: Identifiable,
+    /// Does it stand at a limit of the search?
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_bound: Option<bool>,
+    /// Limits of the search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior_range: Option<[f64; 2]>,
+    /// Value by output error where `value` is by equation error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub output_error_value: Option<f64>,
+    /// Further keys.
+    #[serde(flatten)]
+    pub extra: Extra,
+}
+
+names! {
+    /// How an interval was found.
+    CiMethod {
+        /// Moving-block bootstrap.
+        BlockBootstrap "block_bootstrap",
+        /// Sandwich covariance with block scores.
+        Sandwich "sandwich",
+        /// Profile likelihood.
+        Profile "profile",
+        /// Posterior.
+        Posterior "posterior",
+    }
+}
+
+names! {
+    /// Do the data determine a parameter?
+    Identifiable {
+        /// They do.
+        Yes "yes",
+        /// Roughly.
+        Weak "weak",
+        /// They do not.
+        No "no",
+    }
+}
+
+impl Parameter {
+    /// A parameter in a unit. The interval is put in order and widened to hold the value: a bootstrap need not.
+    pub fn new(name: impl Into<String>, value: f64, unit: impl Into<String>, ci95: [f64; 2]) -> Self {
+        let [a, b] = ci95;
+        Self {
+            name: name.into(),
+            value,
+            unit: unit.into(),
+            ci95: [a.min(b).min(value), a.max(b).max(value)],
+            ci_method: None,
+            identifiable: Identifiable::from_interval(value, ci95),
+            at_bound: None,
+            prior_range: None,
+            output_error_value: None,
+            extra: Extra::default(),
+        }
+    }
+
+    /// A parameter of a physics, in the unit that the vocabulary gives it at a joint that moves like this; none if the
+    /// vocabulary has no such parameter.
+    pub fn of(physics: &Physics, name: &str, motion: Motion, value: f64, ci95: [f64; 2]) -> Option<Self> {
+        let spec = vocabulary().of(physics)?.parameter(name)?;
+        Some(Self { prior_range: Some(spec.raven_range), ..Self::new(name, value, spec.unit_for(motion), ci95) })
+    }
+
+    /// Sets how the interval was found.
+    #[must_use]
+    pub fn method(mut self, method: CiMethod) -> Self {
+        self.ci_method = Some(method);
+        self
+    }
+
+    /// Sets how far the data determine it.
+    #[must_use]
+    pub fn identifiable(mut self, identifiable: Identifiable) -> Self {
+        self.identifiable = identifiable;
+        self
+    }
+}
+
+impl Identifiable {
+    /// `Weak` if the half width exceeds half of the value, else `Yes` (gap-design.md, section 7, rule 9). `No` needs to be
+    /// known from the fit.
+    pub fn from_interval(value: f64, [low, high]: [f64; 2]) -> Self {
+        if 0.5 * (high - low).abs() > 0.5 * value.abs() { Self::Weak } else { Self::Yes }
+    }
+}

@@ -1,0 +1,217 @@
+//! From runs to a report: prepare, learn, search, judge on what was held out, put into words.
+
+use std::time::Instant;
+
+use gap_report::{DataQuality, Level, Pictures, Report};
+use recordings::Recording;
+use simulator::model::RobotModel;
+
+use crate::gates;
+use crate::hypothesis::Dictionary;
+use crate::intervals::{Estimate, estimates};
+use crate::motion::{Band, Motion};
+use crate::nominal::Nominal;
+use crate::problem::{Pair, Problem};
+use crate::robot::Robot;
+use crate::run::{Run, RunError, common};
+use crate::search::{Answer, Thresholds, search};
+use crate::{corrected, flexible, verdicts};
+
+/// One run as it was given.
+#[derive(Debug)]
+pub struct Given {
+    /// Name for the report.
+    pub id: String,
+    /// The recording.
+    pub real: Recording,
+    /// SHA-256 of its file.
+    pub real_sha256: String,
+    /// What a simulator made of the same commands, with the SHA-256 of its file.
+    pub sim: Option<(Recording, String)>,
+}
+
+/// What decides and what is told of it.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Limits of the search.
+    pub thresholds: Thresholds,
+    /// Written into the report; the engine itself draws nothing.
+    pub seed: u64,
+    /// SHA-256 of the robot model and the options.
+    pub config_sha256: String,
+    /// Says on standard error what the search tries.
+    pub trace: bool,
+    /// SHA-256 of the URDF, if the robot came as one.
+    pub urdf_sha256: Option<String>,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum AnalysisError {
+    /// A run cannot be used.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// No channel at all.
+    #[error("{run}: has neither torque nor joint or tip truth beside positions; record tau or dac, truth_jpos or truth_x, truth_y, truth_z")]
+    NoChannel {
+        /// The first run.
+        run: String,
+    },
+}
+
+/// A report with its pictures and the corrected model.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The report.
+    pub report: Report,
+    /// Its pictures.
+    pub pictures: Pictures,
+    /// Text of corrected.toml; none where nothing was found.
+    pub corrected: Option<String>,
+}
+
+/// What the search and the judgement have in common; for the parts that put it into words.
+pub struct Found<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// What is believed of it.
+    pub nominal: &'a Nominal,
+    /// Residuals of the fit.
+    pub problem: &'a Problem<'a>,
+    /// Their columns.
+    pub dictionary: &'a Dictionary<'a>,
+    /// Residuals of what was held out.
+    pub held: &'a Problem<'a>,
+    /// Their columns.
+    pub held_dictionary: &'a Dictionary<'a>,
+    /// What the search found.
+    pub answer: &'a Answer<'a>,
+    /// Sizes of the effects.
+    pub estimates: &'a [Estimate],
+    /// The ceiling.
+    pub ceiling: &'a flexible::Ceiling,
+    /// Noise floor of each cell, fixed before the fit.
+    pub floors: &'a [f64],
+    /// Is there something that the library does not explain?
+    pub unmodelled: bool,
+}
+
+/// Least length of what is fitted on, s.
+const SHORTEST_S: f64 = 6.0;
+/// Share of a single run that is held out.
+const HELD_OUT: f64 = 1.0 / 3.0;
+/// Length of a block, s; long runs take longer ones.
+const BLOCK_S: f64 = 1.5;
+/// Most blocks.
+const BLOCKS: f64 = 40.0;
+/// The library has to reach this share of the ceiling's gain.
+const REACH: f64 = 0.6;
+
+/// Runs the whole analysis.
+///
+/// # Errors
+/// [`AnalysisError`] where there is nothing to compare; everything else ends in a report.
+pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Outcome, AnalysisError> {
+    let begun = Instant::now();
+    let robot = Robot::of(model);
+    progress("reading the runs");
+    let mut runs = Vec::new();
+    for one in given {
+        let real = Run::new(&one.real, &robot)?;
+        let sim = one.sim.as_ref().map(|(sim, _)| Run::new(sim, &robot)).transpose()?;
+        runs.push(match sim {
+            Some(sim) => {
+                let (real, sim) = common(&real, &sim)?;
+                (Run { id: one.id.clone(), ..real }, Some(sim))
+            }
+            None => (Run { id: one.id.clone(), ..real }, None),
+        });
+    }
+    let mut quality = gates::check(&robot, &runs);
+    // A simulation with its input reversed says nothing of the robot: the robot's own numbers stand in for it.
+    if quality.iter().any(|q| q.check == "input_sign" && q.level == Level::Fail && q.message.contains("simulation")) {
+        runs.iter_mut().for_each(|run| run.1 = None);
+    }
+    if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
+        return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
+    }
+    let band = Band::SLOW;
+    let (train, held) = split(&runs);
+    let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
+    if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {
+        quality.insert(0, too_short(train_s));
+        return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
+    }
+    progress("smoothing");
+    let pair = |(real, sim): &(Run, Option<Run>)| Pair { real: Motion::new(real.clone(), band), sim: sim.clone().map(|sim| Motion::new(sim, band)) };
+    let train: Vec<Pair> = train.iter().map(pair).collect();
+    let held: Vec<Pair> = held.iter().map(pair).collect();
+    progress("learning what the simulator believes");
+    let sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
+    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
+    quality.extend(gates::nominal(&robot, &nominal, &sims));
+    let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
+    if problem.cells.is_empty() {
+        return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
+    }
+    let dictionary = Dictionary::new(&problem);
+    let read_s = begun.elapsed().as_secs_f64();
+    progress("searching the library");
+    let mut answer = search(&problem, &dictionary, &options.thresholds, &mut |line| {
+        if options.trace {
+            eprintln!("{line}");
+        }
+    });
+    let screen_s = begun.elapsed().as_secs_f64() - read_s;
+    progress("sizes and intervals");
+    let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
+    let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
+    let beyond = ceiling.together_nats - ceiling.library_nats;
+    let unmodelled = beyond > 2.0 * options.thresholds.nats
+        && ceiling.least_nats > options.thresholds.nats
+        && ceiling.library_nats < REACH * ceiling.together_nats;
+    let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
+    let held_dictionary = Dictionary::new(&held_problem);
+    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
+    let found = Found {
+        robot: &robot,
+        nominal: &nominal,
+        problem: &problem,
+        dictionary: &dictionary,
+        held: &held_problem,
+        held_dictionary: &held_dictionary,
+        answer: &answer,
+        estimates: &estimates,
+        ceiling: &ceiling,
+        floors: &floors,
+        unmodelled,
+    };
+    progress("judging on what was held out");
+    let corrected = (!answer.effects.is_empty()).then(|| corrected::model(model, &found, !sims.is_empty()));
+    let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected);
+    outcome.report.timing.read_s = Some(read_s);
+    outcome.report.timing.screen_s = Some(screen_s);
+    outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
+    outcome.report.timing.threads = Some(2);
+    Ok(outcome)
+}
+
+fn too_short(seconds: f64) -> DataQuality {
+    let needed = SHORTEST_S / (1.0 - HELD_OUT);
+    DataQuality::new("too_short", Level::Fail, format!("{seconds:.1} s are left to fit on; record at least {needed:.0} s, better two runs of 30 s, all joints moving"))
+        .value(seconds, "s")
+}
+
+/// What is fitted on, and what is held out: the last quarter of the runs, at least one; of a single run its last third.
+#[expect(clippy::type_complexity, reason = "two lists of pairs, used once")]
+fn split(runs: &[(Run, Option<Run>)]) -> (Vec<(Run, Option<Run>)>, Vec<(Run, Option<Run>)>) {
+    if let [(real, sim)] = runs {
+        let cut = (real.len() as f64 * (1.0 - HELD_OUT)) as usize;
+        // A second between them, so that neither window nor memory reaches over.
+        let gap = (1.0 / real.dt_s) as usize;
+        let part = |from: usize, to: usize| (real.slice(from, to), sim.as_ref().map(|sim| sim.slice(from, to)));
+        return (vec![part(0, cut)], vec![part((cut + gap).min(real.len() - 1), real.len())]);
+    }
+    let out = (runs.len() / 4).max(1);
+    (runs[..runs.len() - out].to_vec(), runs[runs.len() - out..].to_vec())
+}

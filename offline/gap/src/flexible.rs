@@ -1,0 +1,124 @@
+//! What a flexible predictor gains that knows no physics: the ceiling against which the library is held
+//! (gap-design.md, section 7, rule 7).
+
+use crate::hypothesis::{Column, Dictionary};
+use crate::nominal::sign_series;
+use crate::problem::Cell;
+use crate::score::{Fit, Grams, Scorer};
+
+/// The ceiling beside the library.
+#[derive(Debug, Clone)]
+pub struct Ceiling {
+    /// Gain of the library over nothing, nats.
+    pub library_nats: f64,
+    /// Gain of library and flexible columns together over nothing, nats.
+    pub together_nats: f64,
+    /// Without the block that says most, the gain of the flexible columns over the library.
+    pub least_nats: f64,
+    /// The cell where the flexible columns add most, and what they gain there.
+    pub cell: Option<(usize, f64)>,
+    /// Names of the features that add most there, most first.
+    pub depends_on: Vec<&'static str>,
+}
+
+/// Features of one cell: names and series on the grid.
+fn features(dictionary: &Dictionary, cell: &Cell) -> Vec<(&'static str, Vec<f64>)> {
+    let problem = dictionary.problem;
+    let n = dictionary.joints();
+    let motion = |r: usize| &problem.pairs[r].real;
+    let mut all = Vec::new();
+    let joints: Vec<usize> = match cell.channel {
+        crate::problem::Channel::EndEffector => (0..n).collect(),
+        _ => std::iter::once(cell.index).chain((0..n).filter(|j| *j != cell.index)).collect(),
+    };
+    for (rank, &j) in joints.iter().enumerate() {
+        let q = dictionary.at_grid(|r, i, _| motion(r).position[j][i]);
+        let v = dictionary.at_grid(|r, i, _| motion(r).velocity[j][i]);
+        let mid = crate::nominal::mean(&q);
+        let spread = (0.5 * dictionary.travel(j)).max(1e-9);
+        let x: Vec<f64> = q.iter().map(|q| (q - mid) / spread).collect();
+        let power = |k: i32| x.iter().map(|x| x.powi(k)).collect::<Vec<f64>>();
+        let (own, cell_own) = (rank == 0, cell.channel != crate::problem::Channel::EndEffector);
+        all.push((if own && cell_own { "position" } else { "position of another joint" }, x.clone()));
+        all.push((if own && cell_own { "posture" } else { "posture of the others" }, power(2)));
+        all.push((if own && cell_own { "velocity" } else { "velocity of another joint" }, v.clone()));
+        if own || !cell_own {
+            all.push(("posture", power(3)));
+            let signs: Vec<Vec<f64>> = problem.pairs.iter().map(|pair| sign_series(&pair.real, j)).collect();
+            let sign = dictionary.at_grid(|r, i, _| signs[r][i]);
+            let load = dictionary.load(j);
+            let times = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<f64>>();
+            all.push(("velocity sign", sign.clone()));
+            all.push(("velocity sign and position", times(&sign, &x)));
+            all.push(("velocity sign and posture", times(&sign, &power(2))));
+            all.push(("velocity squared", v.iter().map(|v| v * v.abs()).collect()));
+            all.push(("load", load.clone()));
+            all.push(("load squared", load.iter().map(|l| l * l.abs()).collect()));
+            all.push(("load cubed", load.iter().map(|l| l.powi(3)).collect()));
+            all.push(("load and velocity sign", load.iter().zip(&sign).map(|(l, s)| l.abs() * s).collect()));
+            all.push(("acceleration", dictionary.at_grid(|r, i, _| motion(r).acceleration[j][i])));
+        }
+    }
+    all.push(("constant", vec![1.0; dictionary.grid.len()]));
+    for (k, name) in [(1, "time"), (2, "time")] {
+        all.push((name, dictionary.at_grid(|r, i, _| {
+            let share = i as f64 / motion(r).run.len() as f64;
+            if k == 1 { share } else { share * share }
+        })));
+    }
+    all
+}
+
+/// Fits the flexible columns on top of a set.
+pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none: &Fit) -> Ceiling {
+    let problem = dictionary.problem;
+    let library = scorer.fit(grams);
+    let mut wide = grams.clone();
+    for (c, cell) in problem.cells.iter().enumerate() {
+        let on_grid = cell.channel != crate::problem::Channel::EndEffector;
+        let columns: Vec<Column> = features(dictionary, cell)
+            .into_iter()
+            .map(|(_, series)| {
+                let mut column = Column::default();
+                column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
+                column
+            })
+            .filter(|column| !column.is_empty())
+            .collect();
+        wide = scorer.extended(&wide, &columns);
+    }
+    let together = scorer.fit(&wide);
+    scorer.temper(&wide, &together);
+    let gain = scorer.gain(&library, &together);
+    let by_cell = scorer.gain_by_cell(&library, &together);
+    let cell = by_cell.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, nats)| *nats > 0.0);
+    let depends_on = cell.map_or_else(Vec::new, |(c, _)| telling(dictionary, scorer, grams, &library, c));
+    Ceiling {
+        library_nats: scorer.gain(none, &library).nats,
+        together_nats: scorer.gain(none, &together).nats.max(scorer.gain(none, &library).nats),
+        least_nats: gain.least.min(gain.nats),
+        cell,
+        depends_on,
+    }
+}
+
+/// The features that each alone gain most in a cell.
+fn telling(dictionary: &Dictionary, scorer: &Scorer, grams: &Grams, library: &Fit, c: usize) -> Vec<&'static str> {
+    let cell = &dictionary.problem.cells[c];
+    let on_grid = cell.channel != crate::problem::Channel::EndEffector;
+    let mut all: Vec<(&'static str, f64)> = features(dictionary, cell)
+        .into_iter()
+        .filter_map(|(name, series)| {
+            let mut column = Column::default();
+            column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
+            let fit = scorer.fit(&scorer.extended(grams, &[column]));
+            let nats = scorer.gain(library, &fit).nats;
+            (nats > 1.0).then_some((name, nats))
+        })
+        .collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut names: Vec<&'static str> = all.into_iter().map(|(name, _)| name).collect();
+    names.dedup();
+    names.truncate(3);
+    names
+}

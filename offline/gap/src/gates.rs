@@ -1,0 +1,140 @@
+//! Checks before anything else, because what they find mimics physics.
+
+use gap_report::{DataQuality, Level};
+
+use crate::motion::Motion;
+use crate::nominal::{Nominal, rms};
+use crate::robot::Robot;
+use crate::run::Run;
+
+/// Speed that counts as motion, of the largest speed.
+const MOVING: f64 = 0.05;
+
+/// Checks the runs; failures first.
+pub fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+    let mut all = input_sign(robot, runs);
+    for (real, sim) in runs {
+        all.extend(standing(robot, real));
+        all.extend(repeated(real));
+        if let Some(sim) = sim {
+            all.extend(another_robot(robot, real, sim));
+        }
+    }
+    all.sort_by_key(|q| match q.level {
+        Level::Fail => 0,
+        Level::Warn => 1,
+        Level::Ok => 2,
+    });
+    all
+}
+
+/// Velocity of each joint, from positions, smoothed over some samples.
+fn velocity(run: &Run, joint: usize) -> Vec<f64> {
+    crate::filter::Window::new((4.0 * run.dt_s).max(0.01), run.dt_s).apply(&run.position[joint], 1)
+}
+
+/// Mean power over what the sizes of torque and speed allow, in -1 to 1. A drive with friction gives more than it takes.
+fn power(torque: &[f64], velocity: &[f64]) -> f64 {
+    let work: f64 = torque.iter().zip(velocity).map(|(t, v)| t * v).sum();
+    work / (rms(torque.iter().copied()) * rms(velocity.iter().copied()) * torque.len() as f64).max(1e-300)
+}
+
+/// Sign of torque against velocity: friction takes energy, so over a run every drive gives more than it gets back. A source
+/// whose joints all take energy has its input the other way round.
+fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+    let mut all = Vec::new();
+    let n = robot.joint_count();
+    let mean_power = |of: &dyn Fn(&(Run, Option<Run>), usize) -> Option<f64>| -> Option<Vec<f64>> {
+        (0..n).map(|j| { let each: Option<Vec<f64>> = runs.iter().map(|run| of(run, j)).collect(); each.map(|e| crate::nominal::mean(&e)) }).collect()
+    };
+    let Some(real) = mean_power(&|run, j| run.0.torque.as_ref().map(|t| power(&t[j], &velocity(&run.0, j)))) else { return all };
+    // The simulation was driven by the same commands: its own torque where it has one, else the recording's.
+    let sim = mean_power(&|run, j| {
+        let sim = run.1.as_ref()?;
+        let torque = sim.torque.as_ref().or(run.0.torque.as_ref())?;
+        Some(power(&torque[j], &velocity(sim, j)))
+    });
+    let reversed = |power: &[f64]| power.iter().all(|p| *p < -0.1);
+    let said = |power: &[f64]| power.iter().map(|p| format!("{p:+.2}")).collect::<Vec<_>>().join(", ");
+    if let Some(sim) = &sim
+        && reversed(sim)
+        && !reversed(&real)
+    {
+        let message = format!(
+            "the simulation was driven with its input reversed: its joints take power from the torque (correlation of torque and velocity {}; recording {})",
+            said(sim),
+            said(&real)
+        );
+        all.push(DataQuality::new("input_sign", Level::Fail, message));
+    } else if reversed(&real) {
+        let message = format!("the recording's torque has the other sign than its motion: its joints give power back all the time (correlation of torque and velocity {})", said(&real));
+        all.push(DataQuality::new("input_sign", Level::Fail, message));
+    } else {
+        all.push(DataQuality::new("input_sign", Level::Ok, format!("torque drives the motion (correlation of torque and velocity {})", said(&real))));
+    }
+    all
+}
+
+/// Joints that do not move.
+fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
+    (0..robot.joint_count())
+        .filter_map(|j| {
+            let (low, high) = run.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            (high - low < 1e-4).then(|| {
+                let message = format!("{} does not move: nothing can be said of its friction or transmission; move every joint", robot.joints[j]);
+                DataQuality::new("excitation", Level::Warn, message).run(run.id.clone())
+            })
+        })
+        .collect()
+}
+
+/// Rows that repeat the one before while the robot moves.
+fn repeated(run: &Run) -> Option<DataQuality> {
+    let speeds: Vec<Vec<f64>> = (0..run.position.len()).map(|j| velocity(run, j)).collect();
+    let top: Vec<f64> = speeds.iter().map(|s| s.iter().fold(0.0, |m: f64, v| m.max(v.abs()))).collect();
+    let moving = |i: usize| speeds.iter().zip(&top).any(|(s, t)| s[i].abs() > MOVING * t);
+    let same = |i: usize| run.position.iter().all(|s| s[i] == s[i - 1]);
+    let count = (1..run.len()).filter(|&i| moving(i)).count().max(1);
+    let repeats = (1..run.len()).filter(|&i| moving(i) && same(i)).count();
+    let share = 100.0 * repeats as f64 / count as f64;
+    (share > 2.0).then(|| {
+        let message = format!("{share:.1} % of the samples in motion repeat the one before: polled faster than updated");
+        DataQuality::new("duplicates", Level::Warn, message).run(run.id.clone()).value(share, "%")
+    })
+}
+
+/// A simulation that does not move as the recording does.
+fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
+    (0..robot.joint_count())
+        .filter_map(|j| {
+            let spread = |s: &[f64]| { let mean = crate::nominal::mean(s); rms(s.iter().map(|x| x - mean)) };
+            let apart = rms(real.position[j].iter().zip(&sim.position[j]).map(|(a, b)| a - b));
+            let usual = spread(&real.position[j]).max(1e-9);
+            (apart > 2.0 * usual).then(|| {
+                let message = format!(
+                    "the simulated {} is {:.1} times its own travel away from the recorded one: another robot, other commands, or a free run",
+                    robot.joints[j],
+                    apart / usual
+                );
+                DataQuality::new("closed_loop", Level::Warn, message).run(real.id.clone()).value(apart / usual, "1")
+            })
+        })
+        .collect()
+}
+
+/// How well the tool's own model follows the simulator.
+pub fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
+    if sims.is_empty() {
+        return Vec::new();
+    }
+    (0..robot.joint_count())
+        .filter_map(|j| {
+            let usual = rms(sims.iter().filter_map(|sim| sim.torque.as_ref().map(|t| (sim, t))).flat_map(|(sim, t)| sim.rows.iter().map(move |&i| t[j][i])));
+            let share = nominal.torque_error[j] / usual.max(1e-12);
+            (share > 0.5).then(|| {
+                let message = format!("{:.0} % of the simulated torque of {} is not understood", 100.0 * share, robot.joints[j]);
+                DataQuality::new("nominal_model", Level::Warn, message).value(100.0 * share, "%")
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,216 @@
+//! Building blocks of the columns: series at the rows of the residuals, and how a torque or a deflection reaches each cell.
+
+use arm::serial::Workspace;
+
+use crate::problem::{Channel, Problem};
+
+/// One coefficient's part in every residual: `(cell, values)`, absent where it has none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Column {
+    /// Cells in rising order.
+    pub parts: Vec<(usize, Vec<f64>)>,
+}
+
+impl Column {
+    /// Does it reach no cell?
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Adds a part; a cell that is not there takes nothing.
+    pub fn push(&mut self, cell: Option<usize>, values: Vec<f64>) {
+        if let Some(cell) = cell
+            && values.iter().any(|x| *x != 0.0)
+        {
+            let at = self.parts.partition_point(|(c, _)| *c < cell);
+            self.parts.insert(at, (cell, values));
+        }
+    }
+
+    /// The same, begun at `onset_s` of each run.
+    #[must_use]
+    pub fn begun_at(&self, problem: &Problem, onset_s: f64) -> Self {
+        let parts = self.parts.iter().map(|(cell, values)| {
+            let rows = &problem.cells[*cell].rows;
+            let begun = values.iter().zip(rows).map(|(x, &(r, i))| {
+                if i as f64 * problem.pairs[r].real.run.dt_s >= onset_s { *x } else { 0.0 }
+            });
+            (*cell, begun.collect())
+        });
+        Self { parts: parts.collect() }
+    }
+}
+
+/// Series at the rows that all joint cells share (the grid), and at those of the tip.
+pub struct Dictionary<'a> {
+    /// The residuals.
+    pub problem: &'a Problem<'a>,
+    /// Run, sample and place in the run's own rows of each grid row.
+    pub grid: Vec<(usize, usize, usize)>,
+    /// Jacobian of the tip's position at the tip's rows, 3×N row-major.
+    pub tip_jacobian: Vec<Vec<f64>>,
+    /// Rows of the tip.
+    pub tip_rows: Vec<(usize, usize)>,
+}
+
+impl<'a> Dictionary<'a> {
+    /// For the rows of a problem.
+    pub fn new(problem: &'a Problem<'a>) -> Self {
+        let grid = problem
+            .pairs
+            .iter()
+            .enumerate()
+            .flat_map(|(r, pair)| pair.real.rows.iter().enumerate().map(move |(k, &i)| (r, i, k)))
+            .collect();
+        let tip_rows: Vec<(usize, usize)> = problem.cell(Channel::EndEffector, 0).map_or_else(Vec::new, |c| problem.cells[c].rows.clone());
+        let n = problem.robot.joint_count();
+        let mut ws = Workspace::new(&problem.robot.arm);
+        let tip_jacobian = tip_rows
+            .iter()
+            .map(|&(r, i)| {
+                let q = problem.joints(&problem.pairs[r].real, i);
+                let mut jacobian = vec![0.0; 6 * n];
+                problem.robot.arm.jacobian(&mut ws, &q, &nalgebra::Vector3::zeros(), &mut jacobian);
+                jacobian[..3 * n].to_vec()
+            })
+            .collect();
+        Self { problem, grid, tip_jacobian, tip_rows }
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.problem.robot.joint_count()
+    }
+
+    /// A series at the grid from what is known at each row.
+    pub fn at_grid(&self, mut value: impl FnMut(usize, usize, usize) -> f64) -> Vec<f64> {
+        self.grid.iter().map(|&(r, i, k)| value(r, i, k)).collect()
+    }
+
+    /// A full-rate series per run, smoothed as everything is, at the grid.
+    pub fn smoothed(&self, mut raw: impl FnMut(usize) -> Vec<f64>) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.grid.len());
+        for (r, pair) in self.problem.pairs.iter().enumerate() {
+            let series = raw(r);
+            out.extend(pair.real.rows.iter().map(|&i| pair.real.window.at(&series, i)));
+        }
+        out
+    }
+
+    /// Distance between the ends of a joint's motion, rad or m.
+    pub fn travel(&self, j: usize) -> f64 {
+        let q = self.at_grid(|r, i, _| self.problem.pairs[r].real.position[j][i]);
+        let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        (high - low).max(1e-9)
+    }
+
+    /// Load on the cable of a joint at the grid.
+    pub fn load(&self, joint: usize) -> Vec<f64> {
+        self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
+    }
+
+    /// Values of the grid carried over to the tip's rows: those of the nearest row.
+    pub fn to_tip(&self, grid: &[f64]) -> Vec<f64> {
+        let mut start = vec![0; self.problem.pairs.len()];
+        for (r, pair) in self.problem.pairs.iter().enumerate().skip(1) {
+            start[r] = start[r - 1] + self.problem.pairs[r - 1].real.rows.len();
+            let _ = pair;
+        }
+        self.tip_rows
+            .iter()
+            .map(|&(r, i)| {
+                let rows = &self.problem.pairs[r].real.rows;
+                let step = rows.get(1).map_or(1, |second| second - rows[0]);
+                let k = ((i.saturating_sub(rows[0]) + step / 2) / step).min(rows.len() - 1);
+                grid[start[r] + k]
+            })
+            .collect()
+    }
+
+    /// Torques that the joints need in addition, one series per joint (none: no torque). Those of the links also load the
+    /// cables, so they stretch them by the nominal compliance, and move the tip where the joints are not measured.
+    pub fn effort(&self, torques: &[Option<Vec<f64>>], at_link: bool) -> Column {
+        let mut column = Column::default();
+        for (j, torque) in torques.iter().enumerate() {
+            let Some(torque) = torque else { continue };
+            column.push(self.problem.cell(Channel::JointTorque, j), torque.clone());
+        }
+        if at_link {
+            let stretched: Vec<Option<Vec<f64>>> = torques
+                .iter()
+                .enumerate()
+                .map(|(j, torque)| {
+                    let compliance = self.problem.nominal.compliance[j][0];
+                    torque.as_ref().filter(|_| compliance > 0.0).map(|t| t.iter().map(|x| x * compliance).collect())
+                })
+                .collect();
+            self.stretch(&mut column, &stretched);
+        }
+        column
+    }
+
+    /// Deflections `A⁻¹ m - q` of the joints in addition.
+    pub fn deflection(&self, deflections: &[Option<Vec<f64>>]) -> Column {
+        let mut column = Column::default();
+        self.stretch(&mut column, deflections);
+        column
+    }
+
+    /// A deflection of one joint.
+    pub fn deflection_of(&self, joint: usize, series: Vec<f64>) -> Column {
+        let mut all = vec![None; self.joints()];
+        all[joint] = Some(series);
+        self.deflection(&all)
+    }
+
+    /// A torque of one joint.
+    pub fn effort_of(&self, joint: usize, series: Vec<f64>, at_link: bool) -> Column {
+        let mut all = vec![None; self.joints()];
+        all[joint] = Some(series);
+        self.effort(&all, at_link)
+    }
+
+    fn stretch(&self, column: &mut Column, deflections: &[Option<Vec<f64>>]) {
+        let mut tip = vec![vec![0.0; self.tip_rows.len()]; 3];
+        for (j, deflection) in deflections.iter().enumerate() {
+            let Some(deflection) = deflection else { continue };
+            column.push(self.problem.cell(Channel::Transmission, j), deflection.clone());
+            if !self.problem.tip_from_truth && !self.tip_rows.is_empty() {
+                // The link stays behind the motor by the deflection.
+                for (row, d) in self.to_tip(deflection).into_iter().enumerate() {
+                    for (axis, tip) in tip.iter_mut().enumerate() {
+                        tip[row] -= self.tip_jacobian[row][axis * self.joints() + j] * d;
+                    }
+                }
+            }
+        }
+        for (axis, tip) in tip.into_iter().enumerate() {
+            column.push(self.problem.cell(Channel::EndEffector, axis), tip);
+        }
+    }
+
+    /// A displacement of the measured tip, m, at its rows.
+    pub fn tip(&self, mut displacement: impl FnMut(usize, usize, usize) -> [f64; 3]) -> Column {
+        let moved: Vec<[f64; 3]> = self.tip_rows.iter().enumerate().map(|(row, &(r, i))| displacement(r, i, row)).collect();
+        let mut column = Column::default();
+        for axis in 0..3 {
+            column.push(self.problem.cell(Channel::EndEffector, axis), moved.iter().map(|d| d[axis]).collect());
+        }
+        column
+    }
+}
+
+/// Two series, row by row.
+pub(super) fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+/// A series with the other sign.
+pub(super) fn minus(a: &[f64]) -> Vec<f64> {
+    a.iter().map(|x| -x).collect()
+}
+
+/// Root of the mean square of a series.
+pub(super) fn size(series: &[f64]) -> f64 {
+    crate::nominal::rms(series.iter().copied())
+}

@@ -1,0 +1,101 @@
+//! Contact: a wall, or a steady force.
+
+use std::sync::Arc;
+
+use arm::serial::Workspace;
+use nalgebra::Vector3;
+
+use super::dictionary::Dictionary;
+use super::{Bound, Column, Family, product};
+use crate::problem::Channel;
+
+/// Places of a wall, as shares of the travel along its normal.
+const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
+/// Exponents of its force.
+const EXPONENTS: [f64; 2] = [1.0, 1.5];
+
+/// Tip and Jacobian (3×N row-major) at the grid rows.
+struct Tips {
+    positions: Vec<Vector3<f64>>,
+    jacobians: Vec<Vec<f64>>,
+}
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    const TORQUE: Channel = Channel::JointTorque;
+    if dictionary.problem.cell(TORQUE, 0).is_none() {
+        return;
+    }
+    let tips = Arc::new(tips(dictionary));
+    let own = tips.clone();
+    all.push(
+        Family::fixed("external_contact", &[], "steady force", TORQUE, &[Bound::Free; 3], move |d| {
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| effort(d, &own, |_| axis)).to_vec()
+        })
+        // A force that never lets go is a weight before it is a contact.
+        .penalised(10.0),
+    );
+    for (k, normal) in normals().into_iter().enumerate() {
+        let along = tips.positions.iter().map(|tip| tip.dot(&normal));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let walls = WALLS.map(|share| low + share * (high - low));
+        let tips = tips.clone();
+        all.push(
+            Family::shaped(
+                "external_contact",
+                &[],
+                "wall",
+                TORQUE,
+                &[Bound::Positive],
+                &[("x_0", true), ("p", false), ("normal", false)],
+                product(&[&walls, &EXPONENTS, &[k as f64]]),
+                move |d, s| {
+                    // The wall pushes back, against its normal.
+                    vec![effort(d, &tips, |row| -normal * (tips.positions[row].dot(&normal) - s[0]).max(0.0).powf(s[1]))]
+                },
+            )
+            .penalised(4.0),
+        );
+    }
+}
+
+fn tips(dictionary: &Dictionary) -> Tips {
+    let problem = dictionary.problem;
+    let n = dictionary.joints();
+    let mut ws = Workspace::new(&problem.robot.arm);
+    let mut jacobian = vec![0.0; 6 * n];
+    let (mut positions, mut jacobians) = (Vec::new(), Vec::new());
+    for &(r, i, _) in &dictionary.grid {
+        let q = problem.pairs[r].real.link(i).position;
+        positions.push(problem.robot.arm.tip(&mut ws, &q).translation.vector);
+        problem.robot.arm.jacobian(&mut ws, &q, &Vector3::zeros(), &mut jacobian);
+        jacobians.push(jacobian[..3 * n].to_vec());
+    }
+    Tips { positions, jacobians }
+}
+
+/// A force on the tip asks `-Jᵀ f` of the joints.
+fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3<f64>) -> Column {
+    let n = dictionary.joints();
+    let forces: Vec<Vector3<f64>> = (0..tips.positions.len()).map(force).collect();
+    let torque = |j: usize| {
+        forces.iter().zip(&tips.jacobians).map(|(f, jacobian)| -(0..3).map(|a| jacobian[a * n + j] * f[a]).sum::<f64>()).collect()
+    };
+    let torques: Vec<Option<Vec<f64>>> = (0..n).map(|j| Some(torque(j))).collect();
+    dictionary.effort(&torques, true)
+}
+
+/// Directions of walls: the six axes and the twelve between two of them.
+pub fn normals() -> Vec<Vector3<f64>> {
+    let mut all = Vec::new();
+    for x in -1..=1 {
+        for y in -1..=1 {
+            for z in -1..=1 {
+                let v = Vector3::new(f64::from(x), f64::from(y), f64::from(z));
+                if v.norm_squared() > 0.5 && v.norm_squared() < 2.5 {
+                    all.push(v.normalize());
+                }
+            }
+        }
+    }
+    all
+}

@@ -1,0 +1,139 @@
+//! Friction on the motor's or the link's side, and friction that fades with heat.
+
+use super::dictionary::{Dictionary, size, times};
+use super::{Bound, Family, product};
+use crate::problem::Channel;
+
+/// Travel over which friction turns round, as shares of a joint's usual travel; 0: with the sign of the velocity alone.
+/// Below break-away a bristle keeps its force, which a rigid sign does not: a joint at rest holds what it came with.
+const PRESLIDING: [f64; 4] = [0.0, 0.0005, 0.003, 0.015];
+/// A sign of the motion with the number that rounds it.
+type Turn = fn(&Dictionary, usize, f64) -> Vec<f64>;
+
+/// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
+const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
+/// Speeds below which Stribeck friction rises, as shares of the RMS speed.
+const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
+/// Exponents of the Stribeck curve.
+const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
+/// Time constants of heating, s.
+pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    if dictionary.problem.cell(Channel::JointTorque, 0).is_none() {
+        return;
+    }
+    for j in 0..dictionary.joints() {
+        for (form, at_link) in [("motor side", false), ("link side", true)] {
+            // On the link's side it loads the cable too; seldom told apart, and mostly small there.
+            let penalty = if at_link { 1.0 } else { 0.0 };
+            let mut families = Vec::new();
+            push_side(dictionary, j, form, at_link, &mut families);
+            all.extend(families.into_iter().map(|f| { let own = f.penalty_nats; f.penalised(own + penalty) }));
+        }
+    }
+}
+
+fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: bool, all: &mut Vec<Family>) {
+    const TORQUE: Channel = Channel::JointTorque;
+    let travels = presliding(dictionary, j);
+    let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.velocity[j][i]);
+    let speed = size(&velocity(dictionary)).max(1e-9);
+    let by_load = move |d: &Dictionary, sign: &[f64]| {
+        let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
+        d.effort_of(j, times(sign, &load), at_link)
+    };
+    let positive = Bound::Positive;
+    let slowest = SIGN_SPEED.map(|share| share * speed);
+    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("v_eps", true)], product(&[&slowest]),
+        move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)]));
+    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", true)], product(&[&travels[1..]]),
+        move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)]));
+    for (name, starts, sign) in [("v_eps", &slowest[..], sign_below as Turn), ("presliding", &travels[1..], turning as Turn)] {
+        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], &[(name, true)], product(&[starts]),
+            move |d, s| vec![by_load(d, &sign(d, j, s[0]))]).penalised(1.0));
+        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive, positive], &[(name, true)], product(&[starts]),
+            move |d, s| { let sign = sign(d, j, s[0]); vec![by_load(d, &sign), d.effort_of(j, sign, at_link)] }).penalised(3.0));
+        if !at_link {
+            all.push(Family::shaped("thermal_drift", &[j], "friction fades", TORQUE, &[Bound::Free], &[("T", true), (name, true)],
+                product(&[&HEATING_S, starts]),
+                move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, s[1])), false)]).penalised(2.0));
+        }
+    }
+    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive],
+        move |d| vec![d.effort_of(j, velocity(d), at_link)]));
+    let slow = STRIBECK_SPEED.map(|share| share * speed);
+    all.push(Family::shaped("stribeck_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("v_s", true), ("a", true), ("v_eps", true)],
+        product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]),
+        move |d, s| { let (sign, extra) = stribeck(d, j, s); vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)] }).penalised(3.0));
+}
+
+/// Candidates for the presliding travel of a joint, rad or m.
+fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
+    let travel = dictionary.travel(j);
+    PRESLIDING.iter().map(|share| share * travel).collect()
+}
+
+/// Sign of the motion, turning round over a presliding travel (Dahl), smoothed.
+pub(super) fn turning(dictionary: &Dictionary, j: usize, travel: f64) -> Vec<f64> {
+    dictionary.smoothed(|r| {
+        let motion = &dictionary.problem.pairs[r].real;
+        if travel <= 0.0 {
+            let eps = motion.sign_speed(j);
+            return motion.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect();
+        }
+        let mut state = 0.0;
+        motion.quick_velocity[j]
+            .iter()
+            .map(|v| {
+                let moved = v * motion.run.dt_s / travel;
+                // Exact for a constant direction.
+                let limit = v.signum();
+                state = if moved == 0.0 { state } else { limit + (state - limit) * (-moved.abs()).exp() };
+                state
+            })
+            .collect()
+    })
+}
+
+/// Sign of the velocity, turning over `eps`, smoothed.
+fn sign_below(dictionary: &Dictionary, j: usize, eps: f64) -> Vec<f64> {
+    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect())
+}
+
+/// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, `v_eps`.
+fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let extra = dictionary.smoothed(|r| {
+        let curve = |v: &f64| (v / shape[2]).tanh() * (-(v.abs() / shape[0]).powf(shape[1])).exp();
+        dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(curve).collect()
+    });
+    (sign_below(dictionary, j, shape[2]), extra)
+}
+
+/// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.
+pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64> {
+    // Faster heating is no heating: it would pass for a constant.
+    let heating_s = heating_s.max(HEATING_S[0]);
+    let squares = dictionary.at_grid(|r, i, k| {
+        let problem = dictionary.problem;
+        let torque = problem.pairs[r].real.torque.as_ref().map_or(problem.loads[r][k].motor[j], |torque| torque[j][i]);
+        torque * torque
+    });
+    let mean = crate::nominal::mean(&squares).max(1e-30);
+    let mut h = 0.0;
+    dictionary
+        .grid
+        .iter()
+        .zip(&squares)
+        .enumerate()
+        .map(|(row, (&(r, i, _), square))| {
+            let pair = &dictionary.problem.pairs[r].real;
+            let before = row.checked_sub(1).map(|b| dictionary.grid[b]).filter(|b| b.0 == r);
+            match before {
+                Some(before) => h += (i - before.1) as f64 * pair.run.dt_s * square / mean,
+                None => h = i as f64 * pair.run.dt_s,
+            }
+            1.0 - (-h / heating_s).exp()
+        })
+        .collect()
+}

@@ -1,0 +1,97 @@
+//! Where the measured tip is against the joints: geometry and the frame of the measurement.
+
+use arm::serial::{Body, SerialArm, Tool, Workspace};
+use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
+
+use super::dictionary::Dictionary;
+use super::{Bound, Column, Family};
+use crate::problem::Channel;
+
+const TIP: Channel = Channel::EndEffector;
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    if dictionary.tip_rows.is_empty() {
+        return;
+    }
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let small = Bound::Between(-0.2, 0.2);
+    for link in 0..dictionary.joints() {
+        all.push(Family::fixed("link_geometry", &[link], "twist before the joint", TIP, &[small], move |d| {
+            const TURN: f64 = 1e-4;
+            let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
+            vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| turn * placement), TURN)]
+        }));
+        for (axis, form) in axes.into_iter().zip(["moved along x", "moved along y", "moved along z"]) {
+            all.push(
+                Family::fixed("link_geometry", &[link], form, TIP, &[small], move |d| {
+                    const STEP: f64 = 1e-5;
+                    let step = Translation3::from(axis * STEP);
+                    vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| step * placement), STEP)]
+                })
+                .penalised(2.0),
+            );
+        }
+    }
+    let last = dictionary.joints() - 1;
+    all.push(Family::fixed("link_geometry", &[last], "length", TIP, &[small], longer));
+    let turned = Bound::Between(-0.9, 0.9);
+    let moves = move |d: &Dictionary| axes.map(|axis| d.tip(|_, _, _| axis.into()));
+    let free = Bound::Free;
+    let turns = ["w_x", "w_y", "w_z"];
+    all.push(
+        Family::secant("frame_misalignment", &[], "turned and moved", TIP, &[turned, turned, turned, free, free, free], &turns, move |d, s| {
+            let mut columns = turning(d, s);
+            columns.extend(moves(d));
+            columns
+        })
+        .penalised(1.0),
+    );
+    all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[free; 3], move |d| moves(d).to_vec()));
+    all.push(Family::secant("frame_misalignment", &[], "turned", TIP, &[turned; 3], &turns, turning));
+}
+
+/// `Exp(w) p - p`, one secant for each number of w.
+fn turning(dictionary: &Dictionary, w: &[f64]) -> Vec<Column> {
+    let here = tips(dictionary, &dictionary.problem.robot.arm);
+    let w: Vec<f64> = w.iter().map(|x| if x.abs() < 1e-5 { 1e-5 } else { *x }).collect();
+    let after = |k: usize| Rotation3::from_scaled_axis(Vector3::from_fn(|i, _| if i < k { w[i] } else { 0.0 }));
+    (0..3).map(|k| dictionary.tip(|_, _, row| ((after(k + 1) * here[row] - after(k) * here[row]) / w[k]).into())).collect()
+}
+
+/// Length of the tool: along its offset from the last link.
+fn longer(dictionary: &Dictionary) -> Vec<Column> {
+    const STEP: f64 = 1e-5;
+    let arm = &dictionary.problem.robot.arm;
+    let step = Translation3::from(tool_axis(arm) * STEP);
+    vec![derivative(dictionary, &rebuilt(arm, arm.bodies().to_vec(), step * arm.tool_pose()), STEP)]
+}
+
+/// Direction in which the tool is long, in the last link.
+pub(crate) fn tool_axis(arm: &SerialArm) -> Vector3<f64> {
+    let pose = arm.tool_pose();
+    let offset = pose.translation.vector;
+    if offset.norm() > 1e-6 { offset.normalize() } else { pose.rotation * Vector3::z() }
+}
+
+fn tips(dictionary: &Dictionary, arm: &SerialArm) -> Vec<Vector3<f64>> {
+    let mut ws = Workspace::new(arm);
+    let problem = dictionary.problem;
+    let at = |&(r, i): &(usize, usize)| problem.joints(&problem.pairs[r].real, i);
+    dictionary.tip_rows.iter().map(|row| arm.tip(&mut ws, &at(row)).translation.vector).collect()
+}
+
+fn derivative(dictionary: &Dictionary, arm: &SerialArm, step: f64) -> Column {
+    let (here, there) = (tips(dictionary, &dictionary.problem.robot.arm), tips(dictionary, arm));
+    dictionary.tip(|_, _, row| ((there[row] - here[row]) / step).into())
+}
+
+fn with_placement(arm: &SerialArm, link: usize, change: impl Fn(IsometryMatrix3<f64>) -> IsometryMatrix3<f64>) -> SerialArm {
+    let mut bodies: Vec<Body> = arm.bodies().to_vec();
+    bodies[link].placement = change(bodies[link].placement);
+    rebuilt(arm, bodies, arm.tool_pose())
+}
+
+fn rebuilt(arm: &SerialArm, bodies: Vec<Body>, tool: IsometryMatrix3<f64>) -> SerialArm {
+    let tools = vec![Tool { name: "tip".to_owned(), pose: tool }];
+    SerialArm::new(arm.name(), bodies, arm.gravity_vector(), tools).expect("a small change of an arm that exists")
+}

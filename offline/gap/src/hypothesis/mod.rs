@@ -1,0 +1,230 @@
+//! The library: every physics of the vocabulary as columns that it adds to the residuals.
+
+mod actuation;
+mod dictionary;
+mod environment;
+mod friction;
+mod inertial;
+mod kinematic;
+mod timing;
+mod transmission;
+
+use std::sync::Arc;
+
+pub use dictionary::{Column, Dictionary};
+pub use environment::normals;
+
+use crate::problem::Channel;
+
+/// What a coefficient may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bound {
+    /// Anything.
+    Free,
+    /// Not negative: friction takes energy away, a weight pulls down.
+    Positive,
+    /// Within these.
+    Between(f64, f64),
+}
+
+/// Columns for a shape.
+type Columns = dyn Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync;
+
+/// One form of a physics at its place: linear in its coefficients, for shapes that are searched.
+pub struct Family {
+    /// Name in the vocabulary.
+    pub physics: &'static str,
+    /// Joints (links) it is tied to; empty: to none.
+    pub joints: Vec<usize>,
+    /// Which form of it.
+    pub form: &'static str,
+    /// Channel where it shows most.
+    pub channel: Channel,
+    /// Names of the numbers of its shape.
+    pub shape: Vec<&'static str>,
+    /// Shapes to begin with; one empty shape where there is nothing to search.
+    pub grid: Vec<Vec<f64>>,
+    /// First step of the numbers that are refined between the grid's; none for those that are choices. NaN: half the
+    /// distance to the grid's next.
+    pub steps: Vec<Option<f64>>,
+    /// Are the columns secants from 0 to the shape, so that the fit's own first coefficients are the next shape?
+    pub secant: bool,
+    /// One per coefficient.
+    pub bounds: Vec<Bound>,
+    /// Rank among equals: smaller is simpler or likelier before any data.
+    pub penalty_nats: f64,
+    columns: Arc<Columns>,
+}
+
+impl std::fmt::Debug for Family {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {:?} ({})", self.physics, self.joints, self.form)
+    }
+}
+
+impl Family {
+    /// A form whose columns do not depend on a shape.
+    pub fn fixed(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        columns: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            physics,
+            joints: joints.to_vec(),
+            form,
+            channel,
+            shape: Vec::new(),
+            grid: vec![Vec::new()],
+            steps: Vec::new(),
+            secant: false,
+            bounds: bounds.to_vec(),
+            penalty_nats: 0.0,
+            columns: Arc::new(move |dictionary, _| columns(dictionary)),
+        }
+    }
+
+    /// A form whose columns have a shape: names with whether they are refined, and where to begin.
+    pub fn shaped(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        shape: &[(&'static str, bool)],
+        grid: Vec<Vec<f64>>,
+        columns: impl Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            physics,
+            joints: joints.to_vec(),
+            form,
+            channel,
+            shape: shape.iter().map(|s| s.0).collect(),
+            steps: shape.iter().map(|s| s.1.then_some(f64::NAN)).collect(),
+            secant: false,
+            grid,
+            bounds: bounds.to_vec(),
+            penalty_nats: 0.0,
+            columns: Arc::new(columns),
+        }
+    }
+
+    /// A form in large numbers: the columns are secants from 0 to the shape, one coefficient for each of its numbers first.
+    pub fn secant(
+        physics: &'static str,
+        joints: &[usize],
+        form: &'static str,
+        channel: Channel,
+        bounds: &[Bound],
+        shape: &[&'static str],
+        columns: impl Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Self {
+        let numbers: Vec<(&'static str, bool)> = shape.iter().map(|name| (*name, false)).collect();
+        let start = vec![vec![0.0; shape.len()]];
+        Self { secant: true, ..Self::shaped(physics, joints, form, channel, bounds, &numbers, start, columns) }
+    }
+
+    /// With the first steps of its refinement.
+    #[must_use]
+    pub fn stepped(mut self, steps: &[Option<f64>]) -> Self {
+        self.steps = steps.to_vec();
+        self
+    }
+
+    /// Less likely than its rivals by so much, before any data.
+    #[must_use]
+    pub fn penalised(mut self, nats: f64) -> Self {
+        self.penalty_nats = nats;
+        self
+    }
+}
+
+/// A family at one shape and onset, its columns made.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// What it says.
+    pub family: Arc<Family>,
+    /// Numbers that fix its shape, in the family's order.
+    pub shape: Vec<f64>,
+    /// Seconds from the start of each run at which it begins; none: always there.
+    pub onset_s: Option<f64>,
+    /// One per coefficient.
+    pub columns: Vec<Column>,
+}
+
+impl Candidate {
+    /// Makes the columns.
+    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], onset_s: Option<f64>) -> Self {
+        let mut columns = (family.columns)(dictionary, shape);
+        if let Some(onset) = onset_s {
+            for column in &mut columns {
+                *column = column.begun_at(dictionary.problem, onset);
+            }
+        }
+        Self { family: family.clone(), shape: shape.to_vec(), onset_s, columns }
+    }
+
+    /// A number of its shape.
+    pub fn shape_of(&self, name: &str) -> Option<f64> {
+        self.family.shape.iter().position(|n| *n == name).map(|k| self.shape[k])
+    }
+
+    /// The effect in a cell for given coefficients; empty where it has none.
+    pub fn effect(&self, cell: usize, coefficients: &[f64]) -> Vec<f64> {
+        let mut sum: Vec<f64> = Vec::new();
+        for (column, theta) in self.columns.iter().zip(coefficients) {
+            for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
+                sum.resize(values.len(), 0.0);
+                sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * x);
+            }
+        }
+        sum
+    }
+
+    /// RMS of the effect in a cell for given coefficients.
+    pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
+        crate::nominal::rms(self.effect(cell, coefficients).into_iter())
+    }
+
+    /// Does every coefficient reach some residual?
+    pub fn shows(&self) -> bool {
+        !self.columns.is_empty() && self.columns.iter().all(|column| !column.is_empty())
+    }
+
+    /// Do the two say the same physics at the same place?
+    pub fn same_claim(&self, other: &Self) -> bool {
+        self.family.physics == other.family.physics && self.family.joints == other.family.joints
+    }
+}
+
+/// Every form of every physics that the residuals can show.
+pub fn library(dictionary: &Dictionary) -> Vec<Arc<Family>> {
+    let mut all = Vec::new();
+    friction::push(dictionary, &mut all);
+    inertial::push(dictionary, &mut all);
+    transmission::push(dictionary, &mut all);
+    actuation::push(dictionary, &mut all);
+    kinematic::push(dictionary, &mut all);
+    timing::push(dictionary, &mut all);
+    environment::push(dictionary, &mut all);
+    all.into_iter().map(Arc::new).collect()
+}
+
+/// All combinations of the axes of a grid.
+fn product(axes: &[&[f64]]) -> Vec<Vec<f64>> {
+    axes.iter().fold(vec![Vec::new()], |all, axis| {
+        all.iter()
+            .flat_map(|head| {
+                axis.iter().map(move |x| {
+                    let mut point = head.clone();
+                    point.push(*x);
+                    point
+                })
+            })
+            .collect()
+    })
+}

@@ -1,0 +1,233 @@
+//! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
+
+use super::dictionary::{Dictionary, minus, size};
+use super::{Bound, Column, Family, product};
+use crate::problem::Channel;
+
+/// Widths of play, shares of a joint's travel.
+const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.012, 0.018, 0.027, 0.04, 0.06, 0.09, 0.14];
+/// Loads over which a loaded joint crosses its play, shares of the RMS load.
+const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
+/// Shares of the straight spring in a Bouc-Wen element.
+const STRAIGHT: [f64; 3] = [0.3, 0.6, 0.85];
+/// Yield load over RMS load.
+const YIELD: [f64; 3] = [0.1, 0.3, 0.8];
+/// Time constants of creep, s.
+const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
+/// Periods of an eccentric pulley, from and to as shares of the travel, and how many.
+const PERIODS: (f64, f64, usize) = (0.03, 2.5, 36);
+
+const TRANSMISSION: Channel = Channel::Transmission;
+
+pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
+    let problem = dictionary.problem;
+    if problem.cell(TRANSMISSION, 0).is_none() && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
+        return;
+    }
+    for j in 0..dictionary.joints() {
+        push_play(dictionary, j, all);
+        push_elastic(dictionary, j, all);
+        push_geometry(dictionary, j, all);
+        push_coupling(dictionary, j, all);
+    }
+}
+
+fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let travel = dictionary.travel(j);
+    all.push(Family::shaped(
+        "backlash",
+        &[j],
+        "follows the motion",
+        TRANSMISSION,
+        &[Bound::Between(0.7, 1.4)],
+        &[("b", true)],
+        product(&[&PLAY.map(|share| share * travel)]),
+        move |d, s| vec![d.deflection_of(j, lag(d, j, s[0]))],
+    ));
+    let usual = size(&dictionary.load(j)).max(1e-9);
+    all.push(Family::shaped(
+        "backlash",
+        &[j],
+        "rests on the loaded side",
+        TRANSMISSION,
+        &[Bound::Positive],
+        &[("crossing", true)],
+        product(&[&CROSSING.map(|share| share * usual)]),
+        move |d, s| vec![d.deflection_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
+    ));
+}
+
+/// How far the motor runs ahead of a joint with play.
+fn lag(dictionary: &Dictionary, j: usize, width: f64) -> Vec<f64> {
+    dictionary.smoothed(|r| {
+        let series = &dictionary.problem.pairs[r].real.run.position[j];
+        let mut inner = series[0];
+        series
+            .iter()
+            .map(|x| {
+                inner = f64::clamp(inner, x - 0.5 * width, x + 0.5 * width);
+                x - inner
+            })
+            .collect()
+    })
+}
+
+fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let usual = size(&dictionary.load(j));
+    if usual < 1e-9 {
+        return;
+    }
+    all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
+        vec![d.deflection_of(j, d.load(j))]
+    }));
+    all.push(
+        Family::shaped(
+            "cable_hysteresis",
+            &[j],
+            "Bouc-Wen",
+            TRANSMISSION,
+            &[Bound::Positive, Bound::Free],
+            &[("a", true), ("yield", true)],
+            product(&[&STRAIGHT, &YIELD.map(|share| share * usual)]),
+            move |d, s| {
+                let load = d.load(j);
+                vec![d.deflection_of(j, per_run(d, &load, |run| bouc_wen(run, s[0], s[1]))), d.deflection_of(j, load)]
+            },
+        )
+        .penalised(3.0),
+    );
+    for (form, settled) in [("settled at the start", true), ("fresh at the start", false)] {
+        all.push(
+            Family::shaped("cable_creep", &[j], form, TRANSMISSION, &[Bound::Positive], &[("T_k", true)], product(&[&CREEP_S]), move |d, s| {
+                vec![d.deflection_of(j, crept(d, j, s[0], settled))]
+            })
+            .penalised(1.0),
+        );
+    }
+    all.push(
+        Family::shaped("thermal_drift", &[j], "position", TRANSMISSION, &[Bound::Free], &[("T", true)], product(&[&super::friction::HEATING_S]), move |d, s| {
+            vec![d.deflection_of(j, super::friction::heat(d, j, s[0]))]
+        })
+        .penalised(3.0),
+    );
+}
+
+/// Load behind a first-order lag.
+fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: bool) -> Vec<f64> {
+    // Faster creep is stretch.
+    let time_s = time_s.max(0.5 * CREEP_S[0]);
+    let mut state = 0.0;
+    dictionary
+        .grid
+        .iter()
+        .zip(dictionary.load(j))
+        .map(|(&(r, _, k), load)| {
+            let keep = (-row_period(&dictionary.problem.pairs[r].real) / time_s).exp();
+            state = match k {
+                0 if settled => load,
+                0 => 0.0,
+                _ => keep * state + (1.0 - keep) * load,
+            };
+            state
+        })
+        .collect()
+}
+
+/// Seconds between rows.
+fn row_period(motion: &crate::motion::Motion) -> f64 {
+    motion.rows.get(1).map_or(0.0, |second| (second - motion.rows[0]) as f64 * motion.run.dt_s)
+}
+
+/// A memory of a grid series, run by run.
+fn per_run(dictionary: &Dictionary, series: &[f64], memory: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+    let mut out = Vec::with_capacity(series.len());
+    let mut start = 0;
+    for pair in dictionary.problem.pairs {
+        let end = start + pair.real.rows.len();
+        out.extend(memory(&series[start..end]));
+        start = end;
+    }
+    out
+}
+
+/// Deflection times stiffness of a Bouc-Wen element (n = 1, g = 0.5) under a load, where `load = a x + (1 - a) z`.
+fn bouc_wen(load: &[f64], straight: f64, yields: f64) -> Vec<f64> {
+    let mut z = 0.0_f64;
+    let mut x = load.first().copied().unwrap_or(0.0);
+    let mut before = x;
+    load.iter()
+        .map(|&now| {
+            let step = (now - before) / 8.0;
+            for _ in 0..8 {
+                // zd = xd (1 - |z|/yield (g + (1-g) sgn(xd z))): loading bends, unloading is straight.
+                let slope = 1.0 - (z.abs() / yields) * if step.signum() * z > 0.0 { 1.0 } else { 0.0 };
+                let dx = step / (straight + (1.0 - straight) * slope);
+                x += dx;
+                z = (z + slope * dx).clamp(-yields, yields);
+            }
+            before = now;
+            x
+        })
+        .collect()
+}
+
+fn position(dictionary: &Dictionary, j: usize) -> Vec<f64> {
+    dictionary.at_grid(|r, i, _| dictionary.problem.pairs[r].real.position[j][i])
+}
+
+/// q_true = q + o: the deflection A⁻¹m - q_true is -o.
+fn offset(dictionary: &Dictionary, j: usize) -> Column {
+    dictionary.deflection_of(j, vec![-1.0; dictionary.grid.len()])
+}
+
+fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
+    let (small, free) = (Bound::Between(-0.5, 0.5), Bound::Free);
+    all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
+    all.push(Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]));
+    all.push(Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
+        // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
+        let mut column = ratio(d);
+        column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+        vec![column]
+    }));
+    all.push(
+        Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, free], move |d| {
+            vec![ratio(d), offset(d, j)]
+        })
+        .penalised(1.5),
+    );
+    let travel = dictionary.travel(j);
+    let (from, to, count) = PERIODS;
+    let periods: Vec<f64> = (0..count).map(|k| travel * from * (to / from).powf(k as f64 / (count - 1) as f64)).collect();
+    all.push(
+        Family::shaped("pulley_eccentricity", &[j], "once per turn", TRANSMISSION, &[free, free], &[("period", true)], product(&[&periods]), move |d, s| {
+            let q = position(d, j);
+            // q_true = q + e sin(...): the deflection is the opposite.
+            let wave = |phase: f64| q.iter().map(|q| -(std::f64::consts::TAU * q / s[0] + phase).sin()).collect();
+            vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
+        })
+        .penalised(2.0),
+    );
+}
+
+fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let small = Bound::Between(-0.5, 0.5);
+    for i in (0..dictionary.joints()).filter(|i| *i != j) {
+        let coupled = move |d: &Dictionary| d.deflection_of(j, position(d, i));
+        let pair = [j, i];
+        all.push(Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]));
+        all.push(
+            Family::fixed("joint_coupling", &pair, "position about a place", TRANSMISSION, &[small, Bound::Free], move |d| {
+                vec![coupled(d), offset(d, j)]
+            })
+            .penalised(1.5),
+        );
+        all.push(Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
+            // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
+            let mut column = coupled(d);
+            column.push(d.problem.cell(Channel::JointTorque, i), minus(&d.load(j)));
+            vec![column]
+        }));
+    }
+}

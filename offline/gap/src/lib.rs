@@ -1,0 +1,26 @@
+//! Where a simulation and a recording of a robot differ, which physics is missing, and how large it is (gap-design.md).
+#![deny(missing_docs)]
+
+pub mod filter;
+pub mod intervals;
+pub mod linear;
+pub mod motion;
+pub mod nominal;
+pub mod parameters;
+pub mod problem;
+pub mod robot;
+pub mod run;
+pub mod flexible;
+pub mod hypothesis;
+pub mod noise;
+pub mod refine;
+pub mod score;
+pub mod search;
+
+pub mod analysis;
+mod corrected;
+mod experiment;
+mod gates;
+mod pictures;
+mod regime;
+pub mod verdicts;

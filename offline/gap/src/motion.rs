@@ -1,0 +1,124 @@
+//! Smoothed signals of one run: what every regressor is built from.
+
+use crate::filter::Window;
+use crate::run::Run;
+
+/// How signals are smoothed and sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    /// Standard deviation of the window, s: half power at 0.133/σ Hz.
+    pub sigma_s: f64,
+    /// Time between rows, s.
+    pub step_s: f64,
+}
+
+impl Band {
+    /// Slow content of a kilohertz recording: half power at 11 Hz, 50 rows a second. Above some 5 Hz elastic cables move
+    /// motor and link apart, and stepped encoders rattle.
+    pub const SLOW: Self = Self { sigma_s: 0.012, step_s: 0.02 };
+
+    /// The same for a recording with a period of `dt_s`.
+    #[must_use]
+    pub fn for_period(self, dt_s: f64) -> Self {
+        Self { sigma_s: self.sigma_s.max(0.5 * dt_s), step_s: self.step_s.max(dt_s) }
+    }
+}
+
+/// Smoothing of the velocity whose sign friction follows, s.
+const QUICK_SIGMA_S: f64 = 0.005;
+/// Smoothing of the deflection that carries a motor's motion over to its link, s.
+const DEFLECTION_SIGMA_S: f64 = 0.05;
+
+/// One run, smoothed.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// The signals as they came.
+    pub run: Run,
+    /// The window of all equations.
+    pub window: Window,
+    /// Motor-side joint position, velocity and acceleration, smoothed.
+    pub position: Vec<Vec<f64>>,
+    /// Its velocity.
+    pub velocity: Vec<Vec<f64>>,
+    /// Its acceleration.
+    pub acceleration: Vec<Vec<f64>>,
+    /// Velocity, smoothed little: friction turns with it.
+    pub quick_velocity: Vec<Vec<f64>>,
+    /// Torque at the joints, smoothed.
+    pub torque: Option<Vec<Vec<f64>>>,
+    /// `A⁻¹ m - q`, smoothed.
+    pub deflection: Option<Vec<Vec<f64>>>,
+    slow_deflection: Option<Vec<Vec<f64>>>,
+    /// Samples that make rows.
+    pub rows: Vec<usize>,
+    /// Samples with a measured tip.
+    pub tip_rows: Vec<usize>,
+}
+
+impl Motion {
+    /// Smooths a run.
+    pub fn new(run: Run, band: Band) -> Self {
+        let band = band.for_period(run.dt_s);
+        let window = Window::new(band.sigma_s, run.dt_s);
+        let smooth = |set: &[Vec<f64>], derivative: usize| set.iter().map(|s| window.apply(s, derivative)).collect::<Vec<_>>();
+        let quick = Window::new(QUICK_SIGMA_S.min(band.sigma_s), run.dt_s);
+        let deflection: Option<Vec<Vec<f64>>> = run.truth.as_ref().map(|truth| {
+            run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect()
+        });
+        let slow = Window::new(DEFLECTION_SIGMA_S.max(band.sigma_s), run.dt_s);
+        let margin = window.margin();
+        let step = ((band.step_s / run.dt_s).round() as usize).max(1);
+        let usable = margin..run.len().saturating_sub(margin);
+        let tip_rows = run.tip.as_ref().map_or_else(Vec::new, |tip| {
+            usable.clone().filter(|&i| tip.iter().all(|axis| axis[i].is_finite())).collect::<Vec<_>>()
+        });
+        // A tip at every sample is thinned like the rest.
+        let tip_rows = if tip_rows.len() * 2 > usable.len() { tip_rows.into_iter().step_by(step).collect() } else { tip_rows };
+        Self {
+            position: smooth(&run.position, 0),
+            velocity: smooth(&run.position, 1),
+            acceleration: smooth(&run.position, 2),
+            quick_velocity: run.position.iter().map(|s| quick.apply(s, 1)).collect(),
+            torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
+            slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
+            deflection: deflection.as_ref().map(|d| smooth(d, 0)),
+            rows: usable.step_by(step).collect(),
+            tip_rows,
+            window,
+            run,
+        }
+    }
+
+    /// Position, velocity and acceleration of the links at a sample: the motors' motion, moved by the measured deflection
+    /// where there is one. (The second derivative of a joint encoder is noise; below 5 Hz link and motor accelerate alike.)
+    pub fn link(&self, i: usize) -> State {
+        let n = self.position.len();
+        let at = |set: &[Vec<f64>]| (0..n).map(|j| set[j][i]).collect::<Vec<f64>>();
+        let mut position = at(&self.position);
+        if let Some(slow) = &self.slow_deflection {
+            position.iter_mut().zip(slow).for_each(|(q, d)| *q -= d[i]);
+        }
+        State { position, velocity: at(&self.velocity), acceleration: at(&self.acceleration) }
+    }
+
+    /// Speed below which the sign of the velocity is not known, rad/s or m/s: three standard deviations of the quick
+    /// velocity's noise, estimated from its third differences.
+    pub fn sign_speed(&self, joint: usize) -> f64 {
+        let v = &self.quick_velocity[joint];
+        let mut steps: Vec<f64> = v.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        let moving = v.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        (3.0 * steps.get(steps.len() / 4).copied().unwrap_or(0.0)).clamp(2e-3 * moving, 0.05 * moving + 1e-12)
+    }
+}
+
+/// State of all joints at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// rad or m.
+    pub position: Vec<f64>,
+    /// rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// rad/s² or m/s².
+    pub acceleration: Vec<f64>,
+}

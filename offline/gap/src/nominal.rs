@@ -1,0 +1,247 @@
+//! What the simulator believes: inverse dynamics and deflection, learnt from its own output where it is a black box.
+
+use arm::serial::{PARAMETERS, Workspace};
+use nalgebra::{DMatrix, DVector};
+
+use crate::linear::solve;
+use crate::motion::{Motion, State};
+use crate::robot::Robot;
+
+/// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
+const DRIVE_COLUMNS: usize = 4;
+
+/// A nominal model.
+#[derive(Debug, Clone)]
+pub struct Nominal {
+    /// The links' ten parameters each, as [`arm::serial::SerialArm::parameters`] orders them.
+    pub inertial: Vec<f64>,
+    /// Per joint: rotor inertia, viscous, Coulomb, constant, at the joint.
+    pub drives: Vec<[f64; DRIVE_COLUMNS]>,
+    /// Per joint: compliance of the transmission (rad per N·m or m per N) and constant deflection.
+    pub compliance: Vec<[f64; 2]>,
+    /// RMS of what the model leaves of the simulation's own torque, per joint; 0 where nothing was learnt.
+    pub torque_error: Vec<f64>,
+}
+
+/// Torques at one row.
+#[derive(Debug, Clone)]
+pub struct Load {
+    /// What the links ask of the cable, N·m or N.
+    pub link: Vec<f64>,
+    /// What the motor has to give, at the joint, N·m or N.
+    pub motor: Vec<f64>,
+}
+
+impl Nominal {
+    /// The robot's own numbers.
+    pub fn of(robot: &Robot) -> Self {
+        let n = robot.joint_count();
+        let mut inertial = vec![0.0; PARAMETERS * n];
+        robot.arm.parameters(&mut inertial);
+        let known = |x: f64| if x.is_finite() { x } else { 0.0 };
+        Self {
+            inertial,
+            drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
+            compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
+            torque_error: vec![0.0; n],
+        }
+    }
+
+    /// Learns from the simulator's own runs what its recorded torque and deflection follow, starting from the robot's numbers.
+    ///
+    /// Torque alone does not tell the cable's load where friction is many times larger (a light tool on a stiff drive); the
+    /// simulator's own deflection does, so both are fitted together, the compliance first from the robot's own weights.
+    pub fn learn(robot: &Robot, runs: &[Motion]) -> Self {
+        let mut nominal = Self::of(robot);
+        for _ in 0..2 {
+            nominal.learn_deflection(robot, runs);
+            nominal.learn_torque(robot, runs);
+        }
+        nominal.learn_deflection(robot, runs);
+        nominal
+    }
+
+    fn learn_torque(&mut self, robot: &Robot, runs: &[Motion]) {
+        let n = robot.joint_count();
+        let (links, width) = (PARAMETERS * n, PARAMETERS * n + DRIVE_COLUMNS * n);
+        let rows: usize = runs.iter().filter(|run| run.torque.is_some()).map(|run| run.rows.len()).sum();
+        if rows < 4 * width {
+            return;
+        }
+        let start = Self::of(robot);
+        let mut gram = DMatrix::zeros(width, width);
+        let mut right = DVector::zeros(width);
+        let mut ws = Workspace::new(&robot.arm);
+        let mut y = vec![0.0; n * links];
+        // Rows in units of what the model will leave: a few percent of the torque, noise of the deflection.
+        let torque_scale: Vec<f64> = (0..n)
+            .map(|j| 0.05 * rms(runs.iter().filter_map(|run| run.torque.as_ref().map(|t| (run, t))).flat_map(|(run, t)| run.rows.iter().map(move |&i| t[j][i]))))
+            .collect();
+        let deflection_scale: Vec<f64> = (0..n)
+            .map(|j| 0.1 * rms(runs.iter().filter_map(|run| run.deflection.as_ref().map(|d| (run, d))).flat_map(|(run, d)| run.rows.iter().map(move |&i| d[j][i]))))
+            .collect();
+        let mut row = vec![0.0; width];
+        for run in runs {
+            let Some(torque) = &run.torque else { continue };
+            let signs: Vec<Vec<f64>> = (0..n).map(|j| sign_series(run, j)).collect();
+            for &i in &run.rows {
+                let state = run.link(i);
+                robot.arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
+                for j in 0..n {
+                    row.fill(0.0);
+                    row[..links].copy_from_slice(&y[j * links..(j + 1) * links]);
+                    let compliance = self.compliance[j][0];
+                    if let Some(deflection) = &run.deflection
+                        && compliance > 0.0
+                    {
+                        add(&mut gram, &mut right, &row[..links], deflection[j][i] / compliance, compliance / deflection_scale[j].max(1e-12));
+                    }
+                    let drive = [state.acceleration[j], state.velocity[j], signs[j][i], 1.0];
+                    row[links + DRIVE_COLUMNS * j..][..DRIVE_COLUMNS].copy_from_slice(&drive);
+                    add(&mut gram, &mut right, &row, torque[j][i], 1.0 / torque_scale[j].max(1e-12));
+                }
+            }
+        }
+        // What a lab believes of its own links: a mass within a third, a centre within a few centimetres. Rows stand close,
+        // so they count for a tenth.
+        let mut prior = vec![0.0; width];
+        for link in 0..n {
+            let own = &start.inertial[PARAMETERS * link..PARAMETERS * (link + 1)];
+            for k in 0..PARAMETERS {
+                let spread = match k {
+                    0 => 0.3 * own[0],
+                    1..=3 => 0.3 * own[k].abs() + 0.03 * own[0],
+                    _ => own[k].abs() + 0.02 * own[0],
+                };
+                prior[PARAMETERS * link + k] = own[k];
+                gram[(PARAMETERS * link + k, PARAMETERS * link + k)] += 10.0 / spread.max(1e-4).powi(2);
+                right[PARAMETERS * link + k] += 10.0 * own[k] / spread.max(1e-4).powi(2);
+            }
+        }
+        for j in 0..n {
+            for k in 0..DRIVE_COLUMNS {
+                let place = links + DRIVE_COLUMNS * j + k;
+                gram[(place, place)] *= 1.0 + 1e-9;
+            }
+        }
+        solve(&mut gram, &mut right);
+        self.inertial.copy_from_slice(&right.as_slice()[..links]);
+        for j in 0..n {
+            self.drives[j].copy_from_slice(&right.as_slice()[links + DRIVE_COLUMNS * j..][..DRIVE_COLUMNS]);
+        }
+        self.torque_error = self.torque_left(robot, runs);
+    }
+
+    fn torque_left(&self, robot: &Robot, runs: &[Motion]) -> Vec<f64> {
+        let mut evaluator = Evaluator::new(robot, self);
+        let n = robot.joint_count();
+        let mut left = vec![Vec::new(); n];
+        for run in runs {
+            let Some(torque) = &run.torque else { continue };
+            let signs: Vec<Vec<f64>> = (0..n).map(|j| sign_series(run, j)).collect();
+            for &i in &run.rows {
+                let load = evaluator.load(run, i);
+                for j in 0..n {
+                    left[j].push(torque[j][i] - load.motor[j] - self.drives[j][2] * signs[j][i]);
+                }
+            }
+        }
+        left.into_iter().map(|l| rms(l.into_iter())).collect()
+    }
+
+    fn learn_deflection(&mut self, robot: &Robot, runs: &[Motion]) {
+        let mut compliance = self.compliance.clone();
+        let mut evaluator = Evaluator::new(robot, self);
+        let n = robot.joint_count();
+        let (mut load, mut seen) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+        for run in runs {
+            let Some(deflection) = &run.deflection else { continue };
+            for &i in &run.rows {
+                let at = evaluator.link(&run.link(i));
+                for j in 0..n {
+                    load[j].push(at[j]);
+                    seen[j].push(deflection[j][i]);
+                }
+            }
+        }
+        for j in 0..n {
+            let (x, y) = (&load[j], &seen[j]);
+            if x.len() < 40 || rms(y.iter().copied()) < 1e-12 {
+                continue;
+            }
+            let slope = dot(x, y) / dot(x, x).max(1e-30);
+            let left = rms(x.iter().zip(y).map(|(x, y)| y - slope * x)) / rms(y.iter().copied());
+            // A transmission that does not follow its load is taken for rigid.
+            compliance[j] = [if left < 0.8 { slope.max(0.0) } else { 0.0 }, 0.0];
+        }
+        self.compliance = compliance;
+    }
+}
+
+/// One weighted row of a normal equation.
+fn add(gram: &mut DMatrix<f64>, right: &mut DVector<f64>, row: &[f64], value: f64, weight: f64) {
+    let square = weight * weight;
+    for (i, a) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+        right[i] += square * a * value;
+        for (j, b) in row.iter().enumerate() {
+            gram[(i, j)] += square * a * b;
+        }
+    }
+}
+
+/// Evaluates a nominal model along runs.
+pub struct Evaluator<'a> {
+    robot: &'a Robot,
+    nominal: &'a Nominal,
+    ws: Workspace,
+    regressor: Vec<f64>,
+}
+
+impl<'a> Evaluator<'a> {
+    /// For a robot and what is believed of it.
+    pub fn new(robot: &'a Robot, nominal: &'a Nominal) -> Self {
+        let n = robot.joint_count();
+        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS] }
+    }
+
+    /// Torques of the links at a state; by the regressor, since learnt parameters need not be those of a possible body.
+    pub fn link(&mut self, state: &State) -> Vec<f64> {
+        self.robot.arm.regressor(&mut self.ws, &state.position, &state.velocity, &state.acceleration, &mut self.regressor);
+        self.regressor.chunks_exact(self.nominal.inertial.len()).map(|row| dot(row, &self.nominal.inertial)).collect()
+    }
+
+    /// Load and motor torque at a sample, without the nominal Coulomb friction.
+    pub fn load(&mut self, run: &Motion, i: usize) -> Load {
+        let state = run.link(i);
+        let link = self.link(&state);
+        let motor = (0..link.len())
+            .map(|j| {
+                let [rotor, viscous, _, constant] = self.nominal.drives[j];
+                link[j] + rotor * state.acceleration[j] + viscous * state.velocity[j] + constant
+            })
+            .collect();
+        Load { link, motor }
+    }
+}
+
+/// Smoothed sign of a joint's velocity.
+pub fn sign_series(run: &Motion, joint: usize) -> Vec<f64> {
+    let eps = run.sign_speed(joint);
+    let raw: Vec<f64> = run.quick_velocity[joint].iter().map(|v| (v / eps).tanh()).collect();
+    run.window.apply(&raw, 0)
+}
+
+/// Root of the mean square.
+pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}
+
+/// Mean.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,121 @@
+//! Coefficients and shapes as the vocabulary's parameters, and back.
+
+use crate::hypothesis::Candidate;
+use crate::nominal::Nominal;
+use crate::robot::Robot;
+
+/// A named number with its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// As in the vocabulary.
+    pub name: &'static str,
+    /// As in the vocabulary.
+    pub unit: &'static str,
+    /// Value.
+    pub value: f64,
+}
+
+/// Parameters of a candidate with these coefficients and this shape (which may differ from its own), joint side.
+pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta: &[f64], shape: &[f64]) -> Vec<Named> {
+    let family = &candidate.family;
+    let joint = family.joints.first().copied().unwrap_or(0);
+    let sliding = robot.prismatic.get(joint).copied().unwrap_or(false);
+    let unit = |turning: &'static str, slid: &'static str| if sliding { slid } else { turning };
+    let (effort, position) = (unit("N.m", "N"), unit("rad", "m"));
+    let named = |name, unit, value| Named { name, unit, value };
+    let shaped = |name: &str| family.shape.iter().position(|n| *n == name).map_or(f64::NAN, |k| shape[k]);
+    match (family.physics, family.form) {
+        ("coulomb_friction", _) => vec![named("f_c", effort, theta[0])],
+        ("viscous_friction", _) => vec![named("b", unit("N.m.s/rad", "N.s/m"), theta[0])],
+        ("stribeck_friction", _) => vec![
+            named("f_c", effort, theta[0]),
+            named("f_s", effort, theta[0] + theta[1]),
+            named("v_s", unit("rad/s", "m/s"), shaped("v_s")),
+            named("a", "1", shaped("a")),
+        ],
+        ("load_dependent_friction", _) => {
+            let mut all = vec![named("mu_l", "1", theta[0]), named("mu_theta", "1", theta[0].max(0.0).ln_1p())];
+            if let Some(constant) = theta.get(1) {
+                all.insert(0, named("f_0", effort, *constant));
+            }
+            all
+        }
+        ("thermal_drift", "position") => vec![named("kappa_T", "1", theta[0]), named("T", "s", shaped("T"))],
+        ("thermal_drift", _) => {
+            let friction = nominal.drives[joint][2];
+            let share = if friction > 0.0 { -theta[0] / friction } else { theta[0] };
+            vec![named("kappa_T", "1", share), named("T", "s", shaped("T"))]
+        }
+        ("payload", "anywhere on the last link") => {
+            let mut all = vec![named("m_p", "kg", theta[0])];
+            all.extend(["c_x", "c_y", "c_z"].into_iter().zip(&theta[1..]).map(|(name, moment)| named(name, "m", moment / theta[0])));
+            all
+        }
+        ("payload", _) => {
+            let mut all = vec![named("m_p", "kg", theta[0])];
+            all.extend(["c_x", "c_y", "c_z"].map(|name| named(name, "m", shaped(name))));
+            all
+        }
+        ("gravity_direction", _) => vec![named("a", "rad", theta[0]), named("b", "rad", theta[1])],
+        ("link_inertia", "scaled") => vec![named("dpi_B", "kg", theta[0] * robot.arm.link_inertia(joint).parameters()[0])],
+        ("link_inertia", _) => {
+            let k = shaped("parameter") as usize;
+            vec![named("dpi_B", ["kg", "kg.m", "kg.m2"][usize::from(k > 0) + usize::from(k > 3)], theta[0])]
+        }
+        ("motor_torque_scale", form) => {
+            let scale = if form == "offset" { 1.0 } else { 1.0 / (1.0 + theta[0]) };
+            let mut all = vec![named("kappa", "1", scale)];
+            let per_count = robot.drives[joint].torque_per_count * robot.motor_from_joint[(joint, joint)];
+            if form != "scale" && per_count != 0.0 {
+                all.push(named("d_0", "DAC", theta[theta.len() - 1] / per_count));
+            }
+            all
+        }
+        ("torque_ripple", _) => vec![
+            named("amp", effort, theta[0].hypot(theta[1])),
+            named("order", "1/rev", shaped("order")),
+            named("phase", "rad", theta[1].atan2(theta[0])),
+        ],
+        ("backlash", "follows the motion") => vec![named("b", position, shaped("b"))],
+        ("backlash", _) => vec![named("b", position, theta[0])],
+        ("cable_stretch", _) => vec![named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0])],
+        ("cable_hysteresis", _) => vec![
+            named("a", "1", shaped("a")),
+            named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0]),
+            named("z_m", position, shaped("yield") * theta[0]),
+            named("n", "1", 1.0),
+            named("g", "1", 0.5),
+        ],
+        ("cable_creep", _) => vec![named("J_k", unit("rad/(N.m)", "m/N"), theta[0]), named("T_k", "s", shaped("T_k"))],
+        ("joint_coupling", _) => vec![named("c_ij", unit("rad/rad", "m/rad"), theta[0])],
+        ("joint_offset", _) => vec![named("o", position, theta[0])],
+        ("transmission_ratio", _) => vec![named("e", "1", theta[0])],
+        ("pulley_eccentricity", _) => vec![
+            named("e_over_r", position, theta[0].hypot(theta[1])),
+            named("phi", "rad", theta[1].atan2(theta[0])),
+            named("period", position, shaped("period")),
+        ],
+        ("link_geometry", "twist before the joint") => vec![named("d_alpha", "rad", theta[0])],
+        ("link_geometry", _) => vec![named("d_length", "m", theta[0])],
+        ("measurement_delay", _) => {
+            let mut all = vec![named("d", "s", theta[0])];
+            all.extend(theta.get(1).map(|drift| named("clock_drift", "s/s", *drift)));
+            all
+        }
+        ("frame_misalignment", form) => {
+            let turns = ["w_x", "w_y", "w_z"].map(|name| (name, "rad"));
+            let moves = ["t_x", "t_y", "t_z"].map(|name| (name, "m"));
+            let names: Vec<(&'static str, &'static str)> = match form {
+                "moved" => moves.to_vec(),
+                "turned" => turns.to_vec(),
+                _ => turns.into_iter().chain(moves).collect(),
+            };
+            names.into_iter().zip(theta).map(|((name, unit), value)| named(name, unit, *value)).collect()
+        }
+        ("external_contact", "steady force") => vec![named("f_max", "N", theta.iter().map(|f| f * f).sum::<f64>().sqrt())],
+        ("external_contact", _) => {
+            vec![named("k", "N/m", theta[0]), named("x_0", "m", shaped("x_0")), named("p", "1", shaped("p"))]
+        }
+        (physics, form) => unreachable!("{physics} ({form}) has no parameters here"),
+    }
+}

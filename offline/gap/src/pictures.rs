@@ -1,0 +1,165 @@
+//! Data of the report's figures.
+
+use gap_report::{BeforeAfter, HeatMap, HeatRun, Pictures, Quantity, Share, Signature};
+
+use crate::analysis::Found;
+use crate::hypothesis::Candidate;
+use crate::nominal::rms;
+use crate::problem::{Channel, Problem};
+use crate::run::Run;
+use crate::verdicts::{cell_name, cell_quantity, cell_unit, held_out, main_cell, told};
+
+/// Width of a bin of the heat map, s.
+const BIN_S: f64 = 0.5;
+
+/// Everything that is drawn.
+pub(crate) fn draw(found: &Found, _runs: &[(Run, Option<Run>)]) -> Pictures {
+    let mut pictures = Pictures { heat: heat(found), shares: shares(found), ..Pictures::default() };
+    for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
+        let cell = main_cell(found, &effect.chosen.candidate, &estimate.coefficients);
+        pictures.signatures.push(signature(found, k, cell));
+        pictures.before_after.extend(before_after(found, k as u64 + 1, cell));
+    }
+    pictures
+}
+
+fn heat(found: &Found) -> Vec<HeatMap> {
+    let mut maps: Vec<HeatMap> = Vec::new();
+    for (c, cell) in found.problem.cells.iter().enumerate() {
+        let channel = told(cell.channel);
+        if maps.last().is_none_or(|map| map.channel != channel) {
+            let runs = found.problem.pairs.iter().map(|pair| HeatRun { run: pair.real.run.id.clone(), start_s: pair.real.run.start_s, bin_s: BIN_S, values: Vec::new() });
+            maps.push(HeatMap { channel, rows: Vec::new(), runs: runs.collect() });
+        }
+        let Some(map) = maps.last_mut() else { continue };
+        map.rows.push(cell_name(found.robot, cell));
+        for (r, run) in map.runs.iter_mut().enumerate() {
+            let of = &found.problem.pairs[r].real.run;
+            let bins = ((of.len() as f64 * of.dt_s / BIN_S).ceil() as usize).max(1);
+            let mut each: Vec<Vec<f64>> = vec![Vec::new(); bins];
+            for (&(row_run, i), y) in cell.rows.iter().zip(&cell.residual).filter(|(row, _)| row.0 == r) {
+                debug_assert_eq!(row_run, r);
+                each[((i as f64 * of.dt_s / BIN_S) as usize).min(bins - 1)].push(*y);
+            }
+            run.values.push(each.into_iter().map(|bin| if bin.is_empty() { f64::NAN } else { rms(bin.into_iter()) / found.floors[c].max(1e-300) }).collect());
+        }
+    }
+    maps
+}
+
+/// Share of each cell in its channel's excess energy, in units of its noise.
+fn shares(found: &Found) -> Vec<Share> {
+    let excess: Vec<f64> = found
+        .problem
+        .cells
+        .iter()
+        .zip(found.floors)
+        .map(|(cell, floor)| (rms(cell.residual.iter().copied()).powi(2) / floor.powi(2).max(1e-300) - 1.0).max(0.0))
+        .collect();
+    let mut all = Vec::new();
+    for channel in [Channel::JointTorque, Channel::Transmission, Channel::EndEffector] {
+        let of: Vec<usize> = (0..excess.len()).filter(|c| found.problem.cells[*c].channel == channel).collect();
+        let total: f64 = of.iter().map(|c| excess[*c]).sum();
+        if total > 0.5 {
+            all.extend(of.into_iter().map(|c| Share {
+                channel: told(channel),
+                joint: cell_name(found.robot, &found.problem.cells[c]),
+                regime: String::new(),
+                share: excess[c] / total,
+            }));
+        }
+    }
+    all
+}
+
+/// Series of a problem at a cell's rows: what an effect is drawn against.
+fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, Vec<f64>) {
+    let family = &candidate.family;
+    let rows = &problem.cells[cell].rows;
+    let robot = problem.robot;
+    let joint = family.joints.first().copied().unwrap_or_else(|| problem.cells[cell].index.min(robot.joint_count() - 1));
+    let at = |value: &dyn Fn(usize, usize) -> f64| rows.iter().map(|&(r, i)| value(r, i)).collect::<Vec<f64>>();
+    let motion = |r: usize| &problem.pairs[r].real;
+    let unit = robot.position_unit(joint);
+    let name = &robot.joints[joint];
+    if candidate.onset_s.is_some() {
+        return (Quantity::new("Time", "s"), at(&|r, i| motion(r).run.time_s(i)));
+    }
+    match family.physics {
+        "coulomb_friction" | "viscous_friction" | "stribeck_friction" | "measurement_delay" => {
+            (Quantity::new(format!("Velocity of {name}"), format!("{unit}/s")), at(&|r, i| motion(r).velocity[joint][i]))
+        }
+        "cable_stretch" | "cable_hysteresis" | "load_dependent_friction" | "motor_torque_scale" | "backlash" => {
+            let load = |r: usize, i: usize| {
+                let rows = &problem.pairs[r].real.rows;
+                let k = rows.partition_point(|row| *row < i).min(rows.len() - 1);
+                problem.loads[r][k].link[joint]
+            };
+            (Quantity::new(format!("Load of {name}"), robot.effort_unit(joint)), at(&load))
+        }
+        "joint_coupling" => {
+            let other = family.joints.get(1).copied().unwrap_or(joint);
+            (Quantity::new(format!("Position of {}", robot.joints[other]), robot.position_unit(other)), at(&|r, i| motion(r).position[other][i]))
+        }
+        "thermal_drift" | "cable_creep" => (Quantity::new("Time", "s"), at(&|r, i| motion(r).run.time_s(i))),
+        _ => (Quantity::new(format!("Position of {name}"), unit), at(&|r, i| motion(r).position[joint][i])),
+    }
+}
+
+fn signature(found: &Found, k: usize, cell: usize) -> Signature {
+    let of = &found.problem.cells[cell];
+    let own = &found.answer.effects[k].chosen.candidate;
+    let (feature, x) = feature(found.problem, own, cell);
+    // Only this effect: the others are taken off.
+    let mut before = of.residual.clone();
+    for (i, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
+        if i != k {
+            let other = effect.chosen.candidate.effect(cell, &estimate.coefficients);
+            before.iter_mut().zip(other).for_each(|(y, p)| *y -= p);
+        }
+    }
+    let effect = own.effect(cell, &found.estimates[k].coefficients);
+    let after: Vec<f64> = before.iter().zip(&effect).map(|(y, p)| y - p).collect();
+    let every = (x.len() / 900).max(1);
+    let points = |y: &[f64]| x.iter().zip(y).step_by(every).map(|(x, y)| (*x, *y)).collect::<Vec<_>>();
+    Signature {
+        effect: k as u64 + 1,
+        feature,
+        error: Quantity::new(format!("Error of {}", cell_quantity(found.robot, of)), cell_unit(found.robot, of)),
+        before: points(&before),
+        after: points(&after),
+        curve: vec![curve(&x, &effect)],
+        band: Vec::new(),
+        caption: String::new(),
+    }
+}
+
+/// Mean of the fitted effect over bins of the feature.
+fn curve(x: &[f64], effect: &[f64]) -> Vec<(f64, f64)> {
+    const BINS: usize = 80;
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let width = (high - low).max(1e-300) / BINS as f64;
+    let mut sums = vec![(0.0, 0.0, 0.0); BINS];
+    for (x, y) in x.iter().zip(effect) {
+        let bin = &mut sums[(((x - low) / width) as usize).min(BINS - 1)];
+        *bin = (bin.0 + x, bin.1 + y, bin.2 + 1.0);
+    }
+    sums.into_iter().filter(|s| s.2 > 0.0).map(|s| (s.0 / s.2, s.1 / s.2)).collect()
+}
+
+fn before_after(found: &Found, effect: u64, cell: usize) -> Option<BeforeAfter> {
+    let (c, before, after) = held_out(found, cell)?;
+    let of = &found.held.cells[c];
+    // The first held-out run.
+    let rows: Vec<usize> = (0..of.rows.len()).filter(|k| of.rows[*k].0 == 0).collect();
+    let run = &found.held.pairs[0].real.run;
+    Some(BeforeAfter {
+        effect: Some(effect),
+        run: run.id.clone(),
+        error: Quantity::new(format!("Error of {}", cell_quantity(found.robot, of)), cell_unit(found.robot, of)),
+        t_s: rows.iter().map(|k| run.time_s(of.rows[*k].1)).collect(),
+        before: rows.iter().map(|k| before[*k]).collect(),
+        after: rows.iter().map(|k| after[*k]).collect(),
+        noise_floor: Some(found.floors[cell]),
+    })
+}

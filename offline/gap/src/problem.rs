@@ -1,0 +1,207 @@
+//! The residuals: cells (a channel of a joint or an axis) of rows, over all runs, in blocks of time.
+
+use arm::serial::Workspace;
+
+use crate::motion::Motion;
+use crate::nominal::{Evaluator, Load, Nominal, sign_series};
+use crate::robot::Robot;
+
+/// A residual space (gap-design.md, section 2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Channel {
+    /// Torque at a joint.
+    JointTorque,
+    /// `A⁻¹ m - q` of a joint.
+    Transmission,
+    /// Tip in the base frame, one axis.
+    EndEffector,
+}
+
+/// One scalar residual over all runs.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// Its space.
+    pub channel: Channel,
+    /// Joint or axis.
+    pub index: usize,
+    /// Run and sample of each row.
+    pub rows: Vec<(usize, usize)>,
+    /// Recording minus simulation, N·m, N, rad or m.
+    pub residual: Vec<f64>,
+}
+
+/// Recording and simulation of one run on the same clock.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    /// The recording.
+    pub real: Motion,
+    /// The simulation of the same commands.
+    pub sim: Option<Motion>,
+}
+
+/// Everything that hypotheses are tested on.
+pub struct Problem<'a> {
+    /// The robot.
+    pub robot: &'a Robot,
+    /// What is believed of it.
+    pub nominal: &'a Nominal,
+    /// The runs.
+    pub pairs: &'a [Pair],
+    /// The residuals.
+    pub cells: Vec<Cell>,
+    /// Block of each row of each cell.
+    pub blocks: Vec<Vec<usize>>,
+    /// Number of blocks.
+    pub block_count: usize,
+    /// Nominal load at each row of the joints' cells, per run, in the order of [`Motion::rows`].
+    pub loads: Vec<Vec<Load>>,
+    /// Does the tip residual start from measured joints?
+    pub tip_from_truth: bool,
+}
+
+impl<'a> Problem<'a> {
+    /// Forms the residuals of the runs.
+    pub fn new(robot: &'a Robot, nominal: &'a Nominal, pairs: &'a [Pair], block_s: f64) -> Self {
+        let n = robot.joint_count();
+        let mut evaluator = Evaluator::new(robot, nominal);
+        let loads: Vec<Vec<Load>> =
+            pairs.iter().map(|pair| pair.real.rows.iter().map(|&i| evaluator.load(&pair.real, i)).collect()).collect();
+        let sim_loads: Vec<Option<Vec<Load>>> = pairs
+            .iter()
+            .map(|pair| pair.sim.as_ref().map(|sim| pair.real.rows.iter().map(|&i| evaluator.load(sim, i)).collect()))
+            .collect();
+        let tip_from_truth = pairs.iter().all(|pair| pair.real.run.truth.is_some());
+        let mut problem = Self {
+            robot,
+            nominal,
+            pairs,
+            cells: Vec::new(),
+            blocks: Vec::new(),
+            block_count: 0,
+            loads,
+            tip_from_truth,
+        };
+        if pairs.iter().all(|pair| pair.real.torque.is_some()) {
+            (0..n).for_each(|j| problem.push_torque(j, &sim_loads));
+        }
+        if pairs.iter().all(|pair| pair.real.deflection.is_some()) {
+            (0..n).for_each(|j| problem.push_transmission(j, &sim_loads));
+        }
+        if pairs.iter().all(|pair| !pair.real.tip_rows.is_empty()) {
+            problem.push_tip();
+        }
+        problem.lay_blocks(block_s);
+        problem
+    }
+
+    fn push_torque(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
+        let coulomb = self.nominal.drives[j][2];
+        let mut cell = Cell { channel: Channel::JointTorque, index: j, rows: Vec::new(), residual: Vec::new() };
+        for (r, pair) in self.pairs.iter().enumerate() {
+            let expected = |motion: &Motion, loads: &[Load]| -> Vec<f64> {
+                let sign = (coulomb != 0.0).then(|| sign_series(motion, j));
+                pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + sign.as_ref().map_or(0.0, |s| coulomb * s[i])).collect()
+            };
+            let torque = &pair.real.torque.as_ref().expect("checked by the caller")[j];
+            let mut residual: Vec<f64> =
+                pair.real.rows.iter().zip(expected(&pair.real, &self.loads[r])).map(|(&i, e)| torque[i] - e).collect();
+            if let (Some(sim), Some(loads)) = (&pair.sim, &sim_loads[r])
+                && let Some(torque) = &sim.torque
+            {
+                for ((out, &i), e) in residual.iter_mut().zip(&pair.real.rows).zip(expected(sim, loads)) {
+                    *out -= torque[j][i] - e;
+                }
+            }
+            cell.rows.extend(pair.real.rows.iter().map(|&i| (r, i)));
+            cell.residual.extend(residual);
+        }
+        self.cells.push(cell);
+    }
+
+    fn push_transmission(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
+        let [compliance, constant] = self.nominal.compliance[j];
+        let mut cell = Cell { channel: Channel::Transmission, index: j, rows: Vec::new(), residual: Vec::new() };
+        for (r, pair) in self.pairs.iter().enumerate() {
+            let deflection = &pair.real.deflection.as_ref().expect("checked by the caller")[j];
+            let sim = pair.sim.as_ref().and_then(|sim| sim.deflection.as_ref()).zip(sim_loads[r].as_ref());
+            for (k, &i) in pair.real.rows.iter().enumerate() {
+                let mut value = deflection[i] - compliance * self.loads[r][k].link[j] - constant;
+                if let Some((sim, loads)) = sim {
+                    value -= sim[j][i] - compliance * loads[k].link[j] - constant;
+                }
+                cell.rows.push((r, i));
+                cell.residual.push(value);
+            }
+        }
+        self.cells.push(cell);
+    }
+
+    fn push_tip(&mut self) {
+        let mut cells = [0, 1, 2]
+            .map(|axis| Cell { channel: Channel::EndEffector, index: axis, rows: Vec::new(), residual: Vec::new() });
+        let mut ws = Workspace::new(&self.robot.arm);
+        for (r, pair) in self.pairs.iter().enumerate() {
+            let tip = pair.real.run.tip.as_ref().expect("checked by the caller");
+            let sim = pair.sim.as_ref().filter(|sim| sim.run.tip.is_some());
+            for &i in &pair.real.tip_rows {
+                let expected = self.tip(&mut ws, &pair.real, i);
+                let beside = sim.and_then(|sim| {
+                    let seen = sim.run.tip.as_ref()?;
+                    let expected = self.tip(&mut ws, sim, i);
+                    let off = [0, 1, 2].map(|a| seen[a][i] - expected[a]);
+                    off[0].is_finite().then_some(off)
+                });
+                for (a, cell) in cells.iter_mut().enumerate() {
+                    cell.rows.push((r, i));
+                    cell.residual.push(tip[a][i] - expected[a] - beside.map_or(0.0, |off| off[a]));
+                }
+            }
+        }
+        self.cells.extend(cells);
+    }
+
+    /// Tip of the nominal kinematics where the joints are measured to be, or where the motors say.
+    fn tip(&self, ws: &mut Workspace, motion: &Motion, i: usize) -> [f64; 3] {
+        let q = self.joints(motion, i);
+        self.robot.arm.tip(ws, &q).translation.vector.into()
+    }
+
+    /// Joints from which the tip is expected.
+    pub fn joints(&self, motion: &Motion, i: usize) -> Vec<f64> {
+        match (&motion.run.truth, self.tip_from_truth) {
+            (Some(truth), true) => truth.iter().map(|series| motion.window.at(series, i)).collect(),
+            _ => motion.position.iter().map(|series| series[i]).collect(),
+        }
+    }
+
+    /// Blocks of equal time within each run, for holding out.
+    fn lay_blocks(&mut self, block_s: f64) {
+        let mut first = Vec::new();
+        let mut count = 0;
+        for pair in self.pairs {
+            let span = pair.real.run.len() as f64 * pair.real.run.dt_s;
+            first.push((count, ((span / block_s).round() as usize).max(2), span));
+            count += first[first.len() - 1].1;
+        }
+        self.block_count = count;
+        self.blocks = self
+            .cells
+            .iter()
+            .map(|cell| {
+                cell.rows
+                    .iter()
+                    .map(|&(r, i)| {
+                        let (start, blocks, span) = first[r];
+                        let share = i as f64 * self.pairs[r].real.run.dt_s / span;
+                        start + ((share * blocks as f64) as usize).min(blocks - 1)
+                    })
+                    .collect()
+            })
+            .collect();
+    }
+
+    /// Index of a cell, if the recording has it.
+    pub fn cell(&self, channel: Channel, index: usize) -> Option<usize> {
+        self.cells.iter().position(|cell| cell.channel == channel && cell.index == index)
+    }
+}

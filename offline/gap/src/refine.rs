@@ -1,0 +1,94 @@
+//! Shapes between the points of the grid: a pattern search, one number after the other.
+
+use std::sync::Arc;
+
+use crate::hypothesis::{Candidate, Dictionary, Family};
+
+/// Halvings of a step before a number is settled.
+const HALVINGS: usize = 7;
+/// Times that secants are drawn to the last coefficients.
+const SECANTS: usize = 4;
+/// Rounds over all numbers of a shape.
+const ROUNDS: usize = 2;
+
+/// Every family at every point of its grid.
+pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidate> {
+    let points: Vec<(&Arc<Family>, &Vec<f64>)> = families.iter().flat_map(|family| family.grid.iter().map(move |shape| (family, shape))).collect();
+    let make = |part: &[(&Arc<Family>, &Vec<f64>)]| -> Vec<Candidate> {
+        part.iter().map(|(family, shape)| Candidate::new(dictionary, family, shape, None)).filter(Candidate::shows).collect()
+    };
+    let (left, right) = points.split_at(points.len() / 2);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| make(right));
+        let mut all = make(left);
+        all.extend(other.join().expect("no panic in making columns"));
+        all
+    })
+}
+
+/// Misfit of a candidate and its coefficients; infinite where they may not be.
+pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + 'a;
+
+/// The candidate with its refinable numbers, and its onset, moved to where the misfit is least.
+pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
+    let misfit = &|candidate: &Candidate| fitted(candidate).0;
+    let family = &start.family;
+    let mut best = start.clone();
+    let mut least = misfit(&best);
+    if family.secant {
+        for _ in 0..SECANTS {
+            let shape = fitted(&best).1[..family.shape.len()].to_vec();
+            best = Candidate::new(dictionary, family, &shape, best.onset_s);
+        }
+        least = misfit(&best);
+    }
+    let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
+    let rounds = if free.len() + usize::from(best.onset_s.is_some()) > 1 { ROUNDS } else { 1 };
+    for _ in 0..rounds {
+        for &k in &free {
+            let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
+            for _ in 0..HALVINGS {
+                let here = best.shape[k];
+                for there in [here - step, here + step] {
+                    // A positive number of a grid stays one.
+                    if family.steps[k].is_some_and(f64::is_nan) && here > 0.0 && there <= 0.0 {
+                        continue;
+                    }
+                    let mut shape = best.shape.clone();
+                    shape[k] = there;
+                    try_one(Candidate::new(dictionary, family, &shape, best.onset_s), &mut best, &mut least, misfit);
+                }
+                step *= 0.5;
+            }
+        }
+        if let Some(onset) = best.onset_s {
+            let mut step = 0.4 * onset.max(1.0) / 4.0;
+            let mut at = onset;
+            for _ in 0..HALVINGS + 2 {
+                for there in [at - step, at + step] {
+                    if there > 0.0 {
+                        try_one(Candidate::new(dictionary, family, &best.shape, Some(there)), &mut best, &mut least, misfit);
+                    }
+                }
+                at = best.onset_s.unwrap_or(at);
+                step *= 0.5;
+            }
+        }
+    }
+    best
+}
+
+fn try_one(candidate: Candidate, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {
+    if candidate.shows() {
+        let value = misfit(&candidate);
+        if value < *least {
+            (*best, *least) = (candidate, value);
+        }
+    }
+}
+
+/// Distance to the nearest other value of the grid.
+fn spacing(family: &Family, k: usize, here: f64) -> f64 {
+    let nearest = family.grid.iter().map(|point| (point[k] - here).abs()).filter(|d| *d > 1e-12 * here.abs()).fold(f64::INFINITY, f64::min);
+    if nearest.is_finite() { nearest } else { 0.5 * here.abs().max(1e-6) }
+}

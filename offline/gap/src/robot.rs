@@ -1,0 +1,113 @@
+//! The robot as the engine sees it: a serial arm, its drives and its transmission, nothing about any recording.
+
+use arm::serial::SerialArm;
+use nalgebra::DMatrix;
+use simulator::model::{Connection, RobotError, RobotModel};
+
+/// What one drive is believed to be, on the joint's side of the gearbox.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveNominal {
+    /// Rotor inertia at the joint, kg·m² (prismatic: kg); NaN where it is not known.
+    pub rotor_inertia: f64,
+    /// Coulomb friction, N·m or N.
+    pub coulomb: f64,
+    /// Viscous friction, N·m·s/rad or N·s/m.
+    pub viscous: f64,
+    /// Series stiffness between motor and joint, N·m/rad or N/m; infinite for a rigid one.
+    pub stiffness: f64,
+    /// Torque at the shaft per command count, N·m, with the drive's sign; 0 where not known.
+    pub torque_per_count: f64,
+    /// Joint position where the motor stands at 0.
+    pub offset: f64,
+}
+
+impl Default for DriveNominal {
+    fn default() -> Self {
+        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY, torque_per_count: 0.0, offset: 0.0 }
+    }
+}
+
+/// A place where a weight may hang.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PayloadSite {
+    /// Index of the link.
+    pub link: usize,
+    /// In the link's frame, m.
+    pub position_m: [f64; 3],
+}
+
+/// An arm with its drives.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    /// Its name.
+    pub name: String,
+    /// Kinematics and inertia.
+    pub arm: SerialArm,
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Names of the links.
+    pub links: Vec<String>,
+    /// Does the joint slide?
+    pub prismatic: Vec<bool>,
+    /// Motor positions from joint positions, N×N: `m = A q` (gap-design.md, section 2).
+    pub motor_from_joint: DMatrix<f64>,
+    /// One per joint.
+    pub drives: Vec<DriveNominal>,
+    /// Candidate places of a payload beside the last link.
+    pub payload_sites: Vec<PayloadSite>,
+}
+
+impl Robot {
+    /// A robot from its URDF.
+    ///
+    /// # Errors
+    /// What the reader says.
+    pub fn from_urdf(text: &str) -> Result<Self, RobotError> {
+        Ok(Self::of(&RobotModel::from_urdf(text)?))
+    }
+
+    /// What the engine needs of a robot model. RAVEN-II: joints 1 to 3, those with dynamics.
+    pub fn of(model: &RobotModel) -> Self {
+        let arm = model.arm();
+        let n = model.joint_count().min(arm.joint_count());
+        let a = model.motor_from_joint();
+        let motor_from_joint = DMatrix::from_fn(n, n, |i, j| a[i][j]);
+        let drives = model.drives().into_iter().take(n).map(|drive| {
+            let reduction = drive.reduction;
+            DriveNominal {
+                rotor_inertia: drive.rotor_inertia_kg_m2 * reduction * reduction,
+                coulomb: drive.motor_coulomb_nm * reduction.abs() + drive.joint_coulomb,
+                viscous: drive.motor_viscous_nm_s * reduction * reduction + drive.joint_viscous,
+                stiffness: if drive.connection == Connection::Cable { drive.stiffness } else { f64::INFINITY },
+                torque_per_count: drive.torque_per_count_nm(),
+                offset: drive.offset,
+            }
+        });
+        let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m });
+        Self {
+            name: model.name().to_owned(),
+            joints: model.joint_names().into_iter().take(n).collect(),
+            links: model.link_names().into_iter().take(n).collect(),
+            prismatic: arm.bodies().iter().take(n).map(|body| body.joint.kind.is_prismatic()).collect(),
+            drives: drives.collect(),
+            payload_sites: sites.collect(),
+            motor_from_joint,
+            arm,
+        }
+    }
+
+    /// Number of joints.
+    pub fn joint_count(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Unit of a joint's position.
+    pub fn position_unit(&self, joint: usize) -> &'static str {
+        if self.prismatic[joint] { "m" } else { "rad" }
+    }
+
+    /// Unit of a joint's effort.
+    pub fn effort_unit(&self, joint: usize) -> &'static str {
+        if self.prismatic[joint] { "N" } else { "N.m" }
+    }
+}

@@ -1,0 +1,230 @@
+//! One run: the columns that the engine uses, on a uniform clock, in SI and at the joints.
+
+use nalgebra::DMatrix;
+use recordings::Recording;
+
+use crate::robot::Robot;
+
+/// Why a recording cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RunError {
+    /// A table without a time.
+    #[error("{run}: has no column t_s; give a run with time, not a table")]
+    NoTime {
+        /// File of the run.
+        run: String,
+    },
+    /// Neither motor nor joint positions of some joint.
+    #[error("{run}: has neither mpos_{joint}_rad nor jpos_{joint}_{unit}; the robot {robot} has {joints} joints, give its recording or another --robot")]
+    NoPosition {
+        /// File of the run.
+        run: String,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Its unit.
+        unit: &'static str,
+        /// The robot.
+        robot: String,
+        /// Its joints.
+        joints: usize,
+    },
+    /// Nothing overlaps.
+    #[error("{run}: its time and that of its simulation do not overlap; give the runs in the same order")]
+    NoOverlap {
+        /// File of the run.
+        run: String,
+    },
+}
+
+/// Signals of one run of one source (recording or simulation), each N series of equal length.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Name for the report.
+    pub id: String,
+    /// First time, s.
+    pub start_s: f64,
+    /// Sample period, s.
+    pub dt_s: f64,
+    /// Joint positions as the motors say them, rad or m.
+    pub position: Vec<Vec<f64>>,
+    /// Torques of the motors at the joints (Aᵀ τ), N·m or N.
+    pub torque: Option<Vec<Vec<f64>>>,
+    /// Joint positions measured at the joints.
+    pub truth: Option<Vec<Vec<f64>>>,
+    /// Commanded joint positions.
+    pub command: Option<Vec<Vec<f64>>>,
+    /// Motor positions, rad.
+    pub motor: Option<Vec<Vec<f64>>>,
+    /// Measured tip in the base frame, m; NaN where there was no frame.
+    pub tip: Option<[Vec<f64>; 3]>,
+}
+
+impl Run {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.position[0].len()
+    }
+
+    /// Has it no samples?
+    pub fn is_empty(&self) -> bool {
+        self.position.is_empty() || self.position[0].is_empty()
+    }
+
+    /// Time of a sample, s.
+    pub fn time_s(&self, i: usize) -> f64 {
+        self.start_s + i as f64 * self.dt_s
+    }
+
+    /// Takes the columns of a recording.
+    ///
+    /// # Errors
+    /// [`RunError`] where time or positions are missing.
+    pub fn new(recording: &Recording, robot: &Robot) -> Result<Self, RunError> {
+        let run = recording.name.clone();
+        let time = recording.time_s().ok_or_else(|| RunError::NoTime { run: run.clone() })?;
+        let n = robot.joint_count();
+        let clock = Clock::new(time);
+        let series = |name: &str| recording.column(name).map(|column| clock.resample(time, column));
+        let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
+        // The first of the names that every joint has.
+        let all = |names: &[&dyn Fn(usize) -> String]| {
+            names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
+        };
+        let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
+        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1)]);
+        let from_motors = motor.is_some();
+        let position = match (&motor, reported) {
+            (Some(motor), _) => {
+                let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+                let mut joints = combine(&inverse, motor);
+                for (series, drive) in joints.iter_mut().zip(&robot.drives) {
+                    series.iter_mut().for_each(|q| *q += drive.offset);
+                }
+                joints
+            }
+            (None, Some(reported)) => reported,
+            (None, None) => {
+                let joint = (0..n).find(|&j| series(&format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
+                return Err(RunError::NoPosition { run, joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n });
+            }
+        };
+        let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
+        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none()).map(at_joints);
+        let joint_torque = || {
+            let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
+            all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
+                format!("tau_{}_{}", j + 1, if robot.prismatic[j] { "N" } else { "Nm" })
+            }])
+        };
+        let counted = || {
+            let known = robot.drives.iter().all(|drive| drive.torque_per_count != 0.0);
+            let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
+            let torque = counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
+            Some(at_joints(torque.collect()))
+        };
+        let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
+        let tip = match tip {
+            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+            _ => None,
+        };
+        Ok(Self {
+            id: run,
+            start_s: clock.start_s,
+            dt_s: clock.dt_s,
+            position,
+            torque: motor_torque.or_else(joint_torque).or_else(counted),
+            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
+            command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
+            motor,
+            tip,
+        })
+    }
+
+    /// The samples from `from` up to `to`.
+    #[must_use]
+    pub fn slice(&self, from: usize, to: usize) -> Self {
+        let cut = |set: &Vec<Vec<f64>>| set.iter().map(|s| s[from..to].to_vec()).collect::<Vec<_>>();
+        Self {
+            id: self.id.clone(),
+            start_s: self.time_s(from),
+            dt_s: self.dt_s,
+            position: cut(&self.position),
+            torque: self.torque.as_ref().map(cut),
+            truth: self.truth.as_ref().map(cut),
+            command: self.command.as_ref().map(cut),
+            motor: self.motor.as_ref().map(cut),
+            tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
+        }
+    }
+}
+
+/// The common stretch of a recording and its simulation, sample for sample.
+///
+/// # Errors
+/// [`RunError::NoOverlap`].
+pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
+    let start = real.start_s.max(sim.start_s);
+    let end = real.time_s(real.len() - 1).min(sim.time_s(sim.len() - 1));
+    let count = ((end - start) / real.dt_s + 1.5).floor();
+    if count < 2.0 || (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s {
+        return Err(RunError::NoOverlap { run: real.id.clone() });
+    }
+    let first = |run: &Run| ((start - run.start_s) / run.dt_s).round() as usize;
+    let count = (count as usize).min(real.len() - first(real)).min(sim.len() - first(sim));
+    Ok((real.slice(first(real), first(real) + count), sim.slice(first(sim), first(sim) + count)))
+}
+
+/// Rows of a matrix times a set of series.
+fn combine(matrix: &DMatrix<f64>, series: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let samples = series[0].len();
+    (0..matrix.nrows())
+        .map(|i| {
+            let mut out = vec![0.0; samples];
+            for (j, series) in series.iter().enumerate() {
+                let weight = matrix[(i, j)];
+                if weight != 0.0 {
+                    out.iter_mut().zip(series).for_each(|(out, x)| *out += weight * x);
+                }
+            }
+            out
+        })
+        .collect()
+}
+
+/// A uniform clock laid over the recording's own.
+struct Clock {
+    start_s: f64,
+    dt_s: f64,
+    count: usize,
+    uniform: bool,
+}
+
+impl Clock {
+    fn new(time: &[f64]) -> Self {
+        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let dt_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+        let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
+        let count = (span / dt_s).round() as usize + 1;
+        let uniform = count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
+        Self { start_s, dt_s, count, uniform }
+    }
+
+    /// Linear between samples; a sample next to an empty cell stays empty.
+    fn resample(&self, time: &[f64], values: &[f64]) -> Vec<f64> {
+        if self.uniform {
+            return values.to_vec();
+        }
+        let mut k = 0;
+        (0..self.count)
+            .map(|i| {
+                let t = self.start_s + i as f64 * self.dt_s;
+                while k + 2 < time.len() && time[k + 1] < t {
+                    k += 1;
+                }
+                let share = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
+                values[k] + share * (values[k + 1] - values[k])
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,295 @@
+//! Held-out likelihood of sets of candidates, from Gram matrices per cell and block.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::hypothesis::{Bound, Candidate, Column};
+use crate::linear;
+use crate::noise::{Noise, correlation_time};
+use crate::problem::Problem;
+
+/// Whitened parts of columns: for each, its cells.
+type Parts = Vec<(usize, Vec<f64>)>;
+
+/// Residuals, whitened.
+pub struct Scorer<'a> {
+    problem: &'a Problem<'a>,
+    noise: Vec<Noise>,
+    whitened: Vec<Vec<f64>>,
+    /// Rows that count as one, per cell.
+    pub correlation: Vec<f64>,
+}
+
+/// Sums of products of `p` columns and the residual (last), per cell and block.
+#[derive(Clone)]
+pub struct Grams {
+    columns: usize,
+    /// `[cell][block]`, (p+1)×(p+1).
+    sums: Vec<Vec<DMatrix<f64>>>,
+    parts: Vec<Parts>,
+}
+
+/// A fitted set.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Coefficients.
+    pub coefficients: Vec<f64>,
+    /// Their covariance, innovations taken for white.
+    pub covariance: DMatrix<f64>,
+    /// Held-out squared error of the innovations per cell and block.
+    pub held_out: Vec<Vec<f64>>,
+    /// Squared error per cell with all blocks in the fit.
+    pub within: Vec<f64>,
+    /// Coefficients with each block left out.
+    pub without: Vec<Vec<f64>>,
+}
+
+/// How much better one fit predicts than another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gain {
+    /// Log likelihood of what was held out, nats.
+    pub nats: f64,
+    /// Its standard error over blocks.
+    pub error: f64,
+    /// What remains without the block that says most.
+    pub least: f64,
+}
+
+impl<'a> Scorer<'a> {
+    /// With the noise of each cell.
+    pub fn new(problem: &'a Problem<'a>, noise: Vec<Noise>) -> Self {
+        let whitened: Vec<Vec<f64>> = (0..problem.cells.len()).map(|c| whiten(problem, &noise[c], c, &problem.cells[c].residual)).collect();
+        let correlation = vec![1.0; whitened.len()];
+        Self { problem, noise, whitened, correlation }
+    }
+
+    /// Residual of a fit, whitened, per cell.
+    pub fn left(&self, grams: &Grams, fit: &Fit) -> Vec<Vec<f64>> {
+        let mut left = self.whitened.clone();
+        for (parts, theta) in grams.parts.iter().zip(&fit.coefficients) {
+            for (c, values) in parts {
+                left[*c].iter_mut().zip(values).for_each(|(y, x)| *y -= theta * x);
+            }
+        }
+        left
+    }
+
+    /// Takes every row for itself.
+    pub fn untempered(&mut self) {
+        self.correlation.fill(1.0);
+    }
+
+    /// Takes the correlation times of a fit's residual.
+    pub fn temper(&mut self, grams: &Grams, fit: &Fit) {
+        let left = self.left(grams, fit);
+        self.correlation = (0..left.len())
+            .map(|c| {
+                let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[c][s]).collect();
+                correlation_time(&parts)
+            })
+            .collect();
+    }
+
+    fn parts(&self, column: &Column) -> Parts {
+        column.parts.iter().map(|(c, values)| (*c, whiten(self.problem, &self.noise[*c], *c, values))).collect()
+    }
+
+    /// Grams of nothing but the residual.
+    pub fn empty(&self) -> Grams {
+        let sums = self
+            .whitened
+            .iter()
+            .enumerate()
+            .map(|(c, y)| {
+                let mut sums = vec![DMatrix::zeros(1, 1); self.problem.block_count];
+                y.iter().zip(&self.problem.blocks[c]).for_each(|(y, b)| sums[*b][(0, 0)] += y * y);
+                sums
+            })
+            .collect();
+        Grams { columns: 0, sums, parts: Vec::new() }
+    }
+
+    /// Grams with more columns.
+    pub fn extended(&self, grams: &Grams, columns: &[Column]) -> Grams {
+        let (old, new) = (grams.columns, columns.len());
+        let p = old + new;
+        let fresh: Vec<Parts> = columns.iter().map(|column| self.parts(column)).collect();
+        let mut sums: Vec<Vec<DMatrix<f64>>> = grams
+            .sums
+            .iter()
+            .map(|cell| {
+                cell.iter()
+                    .map(|g| {
+                        DMatrix::from_fn(p + 1, p + 1, |i, j| {
+                            let place = |k: usize| if k < old { Some(k) } else if k == p { Some(old) } else { None };
+                            match (place(i), place(j)) {
+                                (Some(i), Some(j)) => g[(i, j)],
+                                _ => 0.0,
+                            }
+                        })
+                    })
+                    .collect()
+            })
+            .collect();
+        for (k, parts) in fresh.iter().enumerate() {
+            for (c, values) in parts {
+                let blocks = &self.problem.blocks[*c];
+                let mut add = |other: usize, series: &[f64]| {
+                    let mut totals = vec![0.0; self.problem.block_count];
+                    for ((x, y), b) in values.iter().zip(series).zip(blocks) {
+                        totals[*b] += x * y;
+                    }
+                    for (b, total) in totals.into_iter().enumerate() {
+                        sums[*c][b][(old + k, other)] = total;
+                        sums[*c][b][(other, old + k)] = total;
+                    }
+                };
+                add(p, &self.whitened[*c]);
+                for (other, parts) in grams.parts.iter().chain(&fresh[..=k]).enumerate() {
+                    if let Some((_, series)) = parts.iter().find(|(cell, _)| cell == c) {
+                        add(other, series);
+                    }
+                }
+            }
+        }
+        let mut parts = grams.parts.clone();
+        parts.extend(fresh);
+        Grams { columns: p, sums, parts }
+    }
+
+    /// Fits, and predicts each block from the others.
+    pub fn fit(&self, grams: &Grams) -> Fit {
+        let p = grams.columns;
+        let cells = grams.sums.len();
+        let totals: Vec<DMatrix<f64>> = grams.sums.iter().map(|cell| cell.iter().fold(DMatrix::zeros(p + 1, p + 1), |a, b| a + b)).collect();
+        let mut weights: Vec<f64> = (0..cells).map(|c| self.rows(c) / totals[c][(p, p)].max(1e-300)).collect();
+        let mut coefficients = DVector::zeros(p);
+        let mut normal = DMatrix::zeros(p, p);
+        let mut within = vec![0.0; cells];
+        for _ in 0..3 {
+            let (gram, right) = weighted(&totals, &weights, p);
+            coefficients = right;
+            normal.copy_from(&gram);
+            linear::solve(&mut gram.clone(), &mut coefficients);
+            for c in 0..cells {
+                within[c] = squared_error(&totals[c], &coefficients, p);
+                weights[c] = self.rows(c) / within[c].max(1e-300);
+            }
+        }
+        let mut held_out = vec![vec![0.0; self.problem.block_count]; cells];
+        let mut without = Vec::with_capacity(self.problem.block_count);
+        let (gram, right) = weighted(&totals, &weights, p);
+        for b in 0..self.problem.block_count {
+            let (mut gram, mut theta) = (gram.clone(), right.clone());
+            for c in 0..cells {
+                let sums = &grams.sums[c][b];
+                for i in 0..p {
+                    theta[i] -= weights[c] * sums[(i, p)];
+                    for j in 0..p {
+                        gram[(i, j)] -= weights[c] * sums[(i, j)];
+                    }
+                }
+            }
+            linear::solve(&mut gram, &mut theta);
+            for c in 0..cells {
+                held_out[c][b] = squared_error(&grams.sums[c][b], &theta, p);
+            }
+            without.push(theta.as_slice().to_vec());
+        }
+        let covariance = linear::inverse(&normal).unwrap_or_else(|| DMatrix::from_diagonal_element(p, p, f64::INFINITY));
+        Fit { coefficients: coefficients.as_slice().to_vec(), covariance, held_out, within, without }
+    }
+
+    /// Negative log likelihood of a fit on all rows, nats, up to a constant.
+    pub fn misfit(&self, fit: &Fit) -> f64 {
+        fit.within.iter().enumerate().map(|(c, sum)| 0.5 * self.rows(c) / self.correlation[c] * sum.max(1e-300).ln()).sum()
+    }
+
+    fn rows(&self, cell: usize) -> f64 {
+        self.whitened[cell].len() as f64
+    }
+
+    /// Gain of `better` over `base` on what was held out, per cell, nats.
+    pub fn gain_by_cell(&self, base: &Fit, better: &Fit) -> Vec<f64> {
+        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>().max(1e-300);
+        (0..base.held_out.len()).map(|c| 0.5 * self.rows(c) / self.correlation[c] * (sum(base, c) / sum(better, c)).ln()).collect()
+    }
+
+    /// Gain of `better` over `base` on what was held out.
+    pub fn gain(&self, base: &Fit, better: &Fit) -> Gain {
+        let total = |skip: Option<usize>| -> f64 {
+            (0..base.held_out.len())
+                .map(|c| {
+                    let sum = |fit: &Fit| -> f64 {
+                        fit.held_out[c].iter().enumerate().filter(|(b, _)| Some(*b) != skip).map(|(_, e)| e).sum::<f64>().max(1e-300)
+                    };
+                    0.5 * self.rows(c) / self.correlation[c] * (sum(base) / sum(better)).ln()
+                })
+                .sum()
+        };
+        let blocks = self.problem.block_count;
+        let left: Vec<f64> = (0..blocks).map(|b| total(Some(b))).collect();
+        let mean = left.iter().sum::<f64>() / blocks as f64;
+        let spread: f64 = left.iter().map(|x| (x - mean).powi(2)).sum();
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min);
+        Gain { nats: total(None), least, error: ((blocks - 1) as f64 / blocks as f64 * spread).sqrt() }
+    }
+}
+
+/// Are the coefficients of a candidate, the last ones of a fit, what they may be?
+pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
+    let own = &fit.coefficients[fit.coefficients.len() - candidate.columns.len()..];
+    own.iter().zip(&candidate.family.bounds).all(|(x, bound)| match bound {
+        Bound::Free => true,
+        Bound::Positive => *x > 0.0,
+        Bound::Between(low, high) => (*low..=*high).contains(x),
+    })
+}
+
+fn weighted(totals: &[DMatrix<f64>], weights: &[f64], p: usize) -> (DMatrix<f64>, DVector<f64>) {
+    let mut gram = DMatrix::zeros(p, p);
+    let mut right = DVector::zeros(p);
+    for (total, weight) in totals.iter().zip(weights) {
+        for i in 0..p {
+            right[i] += weight * total[(i, p)];
+            for j in 0..p {
+                gram[(i, j)] += weight * total[(i, j)];
+            }
+        }
+    }
+    (gram, right)
+}
+
+/// Squared error of the residual less the columns times `theta`, from sums of products.
+fn squared_error(sums: &DMatrix<f64>, theta: &DVector<f64>, p: usize) -> f64 {
+    let mut error = sums[(p, p)];
+    for i in 0..p {
+        error -= 2.0 * theta[i] * sums[(i, p)];
+        for j in 0..p {
+            error += theta[i] * theta[j] * sums[(i, j)];
+        }
+    }
+    error.max(0.0)
+}
+
+/// Innovations of a cell's series, run by run.
+fn whiten(problem: &Problem, noise: &Noise, cell: usize, series: &[f64]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(series.len());
+    for segment in segments(problem, cell) {
+        noise.whiten(&series[segment], &mut out);
+    }
+    out
+}
+
+/// Rows of a cell, run by run.
+pub fn segments(problem: &Problem, cell: usize) -> Vec<std::ops::Range<usize>> {
+    let rows = &problem.cells[cell].rows;
+    let mut all = Vec::new();
+    let mut start = 0;
+    for k in 1..=rows.len() {
+        if k == rows.len() || rows[k].0 != rows[start].0 {
+            all.push(start..k);
+            start = k;
+        }
+    }
+    all
+}

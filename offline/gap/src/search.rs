@@ -1,0 +1,400 @@
+//! Which candidates explain the residuals: forward, then swap and drop (gap-design.md, section 7).
+
+use std::sync::Arc;
+
+use crate::hypothesis::{Candidate, Dictionary, Family, library};
+use crate::noise::Noise;
+use crate::problem::{Channel, Problem};
+use crate::refine::{refined, starts};
+use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
+
+/// What decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thresholds {
+    /// Least gain of an effect, nats.
+    pub nats: f64,
+    /// Least share of the remaining squared error of its best cell that a further effect has to remove.
+    pub share: f64,
+    /// Least RMS of a further effect, of the largest effect's in some cell where it helps: what is smaller may be the
+    /// larger one's model error.
+    pub amplitude: f64,
+    /// Claims whose scores differ by less than this share are equal: the simpler one is taken.
+    pub equal: f64,
+    /// Most effects.
+    pub effects: usize,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.02, effects: 4 }
+    }
+}
+
+/// A candidate with what it gains beside the others chosen.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Over the set without it.
+    pub gain: Gain,
+    /// Gain less what is paid for being searched or less likely, nats.
+    pub score: f64,
+    /// Coefficients of its columns.
+    pub coefficients: Vec<f64>,
+}
+
+/// An effect that was accepted, and its rivals.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    /// What was accepted.
+    pub chosen: Scored,
+    /// The best of every other claim in its place, beside the other effects, best first.
+    pub rivals: Vec<Scored>,
+    /// Largest share of a cell's squared error that it removes beside the others.
+    pub share: f64,
+}
+
+/// The search's answer.
+pub struct Answer<'a> {
+    /// In the order of acceptance.
+    pub effects: Vec<Effect>,
+    /// Columns of all effects, in order.
+    pub grams: Grams,
+    /// Fit of all of them together.
+    pub fit: Fit,
+    /// Fit of none.
+    pub none: Fit,
+    /// The best that was not accepted.
+    pub next: Option<Scored>,
+    /// Scores of this problem.
+    pub scorer: Scorer<'a>,
+    /// Everything that could have been said.
+    pub families: Vec<Arc<Family>>,
+}
+
+/// Measurement noise of every cell: white at the sensor, coloured by the window.
+fn window_noise(problem: &Problem) -> Vec<Noise> {
+    let motion = &problem.pairs[0].real;
+    let step = motion.rows.get(1).map_or(1, |second| second - motion.rows[0]);
+    let behind = motion.window.autocovariance(step, 3);
+    let of = |tip: bool, rows: usize| if tip { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
+    problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()
+}
+
+/// A search under way.
+struct Search<'p, 'd> {
+    problem: &'p Problem<'p>,
+    dictionary: &'d Dictionary<'p>,
+    scorer: Scorer<'p>,
+    candidates: Vec<Candidate>,
+    thresholds: Thresholds,
+}
+
+/// Searches.
+pub fn search<'p>(
+    problem: &'p Problem<'p>,
+    dictionary: &Dictionary<'p>,
+    thresholds: &Thresholds,
+    trace: &mut dyn FnMut(String),
+) -> Answer<'p> {
+    let families = library(dictionary);
+    let candidates: Vec<Candidate> = starts(dictionary, &families);
+    let mut search = Search { problem, dictionary, scorer: Scorer::new(problem, window_noise(problem)), candidates, thresholds: *thresholds };
+    let none = search.scorer.fit(&search.scorer.empty());
+    let mut chosen: Vec<Candidate> = Vec::new();
+    let mut next = None;
+    while chosen.len() < thresholds.effects {
+        let base = search.grams(&chosen, None);
+        let ranked = search.rank(&chosen);
+        ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
+        let mut accepted = None;
+        for scored in ranked.into_iter().take(5) {
+            let (judged, share, amplitude) = search.judged(&base, &chosen, scored);
+            trace(format!("  judged: {} removes {:.1} %, amplitude {amplitude:.2}", describe(&judged), 100.0 * share));
+            if search.accepts(&judged, share, amplitude) {
+                accepted = Some(judged);
+                break;
+            }
+            next = next.or(Some(judged));
+        }
+        let Some(best) = accepted else { break };
+        next = None;
+        chosen.push(best.candidate);
+        search.polish(&mut chosen);
+    }
+    let effects = search.settle(&mut chosen, trace);
+    let grams = search.grams(&chosen, None);
+    let fit = search.scorer.fit(&grams);
+    search.scorer.temper(&grams, &fit);
+    Answer { effects, grams, fit, none, next, scorer: search.scorer, families }
+}
+
+impl Search<'_, '_> {
+    fn grams(&self, chosen: &[Candidate], without: Option<usize>) -> Grams {
+        chosen.iter().enumerate().filter(|(k, _)| Some(*k) != without).fold(self.scorer.empty(), |grams, (_, candidate)| {
+            self.scorer.extended(&grams, &candidate.columns)
+        })
+    }
+
+    /// Gain with the correlation that the model itself leaves, the share of a cell that it removes, and its RMS over the
+    /// largest other effect's where it removes as much as is asked.
+    fn judged(&mut self, base: &Grams, others: &[Candidate], scored: Scored) -> (Scored, f64, f64) {
+        let before = self.scorer.fit(base);
+        let grams = self.scorer.extended(base, &scored.candidate.columns);
+        let after = self.scorer.fit(&grams);
+        let gain = self.significance(others, &scored.candidate);
+        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
+        let shares: Vec<f64> = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).collect();
+        let mut start = 0;
+        let mut sizes: Vec<Vec<f64>> = Vec::new();
+        for candidate in others.iter().chain([&scored.candidate]) {
+            let theta = &after.coefficients[start..start + candidate.columns.len()];
+            start += theta.len();
+            sizes.push((0..shares.len()).map(|c| candidate.rms(c, theta)).collect());
+        }
+        let own = sizes.pop().unwrap_or_default();
+        let amplitude = (0..shares.len())
+            .filter(|c| shares[*c] >= self.thresholds.share)
+            .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
+            .fold(0.0, f64::max);
+        let share = shares.into_iter().fold(0.0, f64::max);
+        let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
+        (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)
+    }
+
+    /// Gain of a candidate over the others with the noise that it leaves itself (Cochrane-Orcutt): by its autoregression, or
+    /// by the number of rows that count as one; whichever says more. Noise that an effect only seems to explain stays in
+    /// what it leaves, and is whitened away.
+    fn significance(&self, others: &[Candidate], candidate: &Candidate) -> Gain {
+        let mut best: Option<Gain> = None;
+        let all = |scorer: &Scorer| {
+            let base = others.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
+            let with = scorer.extended(&base, &candidate.columns);
+            (base, with)
+        };
+        let (_, with) = all(&self.scorer);
+        let noise = self.noise_left(others, candidate, &self.scorer.fit(&with));
+        for noise in [window_noise(self.problem), noise] {
+            let mut scorer = Scorer::new(self.problem, noise);
+            let (base, with) = all(&scorer);
+            let (before, after) = (scorer.fit(&base), scorer.fit(&with));
+            scorer.temper(&with, &after);
+            let gain = scorer.gain(&before, &after);
+            if best.is_none_or(|b| gain.nats > b.nats) {
+                best = Some(gain);
+            }
+        }
+        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0 })
+    }
+
+    /// Autoregression of what a set leaves, per cell.
+    fn noise_left(&self, others: &[Candidate], candidate: &Candidate, fit: &Fit) -> Vec<Noise> {
+        let all = || others.iter().chain([candidate]);
+        (0..self.problem.cells.len())
+            .map(|c| {
+                let mut left = self.problem.cells[c].residual.clone();
+                let mut start = 0;
+                for own in all() {
+                    let theta = &fit.coefficients[start..start + own.columns.len()];
+                    start += theta.len();
+                    left.iter_mut().zip(own.effect(c, theta)).for_each(|(y, p)| *y -= p);
+                }
+                let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
+                Noise::fit(&parts)
+            })
+            .collect()
+    }
+
+    fn accepts(&self, best: &Scored, share: f64, amplitude: f64) -> bool {
+        let alone = amplitude.is_infinite();
+        best.score >= self.thresholds.nats
+            && best.gain.least >= 0.5 * self.thresholds.nats
+            && (alone || (share >= self.thresholds.share && amplitude >= self.thresholds.amplitude))
+    }
+
+    /// Shapes of all that was chosen, one after the other, beside the rest.
+    fn polish(&self, chosen: &mut [Candidate]) {
+        if chosen.len() < 2 {
+            return;
+        }
+        for k in 0..chosen.len() {
+            let base = self.grams(chosen, Some(k));
+            chosen[k] = self.refined(&base, &chosen[k]);
+        }
+    }
+
+    fn refined(&self, base: &Grams, candidate: &Candidate) -> Candidate {
+        refined(self.dictionary, candidate, &|candidate| {
+            let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
+            let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+            (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
+        })
+    }
+
+    /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
+    fn settle(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        let mut sweep = 0;
+        'again: loop {
+            sweep += 1;
+            effects.clear();
+            // The last ones first: they explain what the first ones may explain as well, once refined alone.
+            for k in (0..chosen.len()).rev() {
+                let mut others: Vec<Candidate> = chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+                if let [only] = others.as_mut_slice() {
+                    *only = self.refined(&self.scorer.empty(), only);
+                } else {
+                    self.polish(&mut others);
+                }
+                let base = self.grams(&others, None);
+                let mut ranked = self.rank(&others);
+                // Claims that stand beside are not also rivals.
+                ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
+                let Some(best) = ranked.first().cloned() else { continue };
+                let swapped = !best.candidate.same_claim(&chosen[k]);
+                let (judged, share, amplitude) = self.judged(&base, &others, best);
+                if !self.accepts(&judged, share, amplitude) {
+                    trace(format!("  dropped {} share {share:.2} amplitude {amplitude:.2}", describe(&judged)));
+                    *chosen = others;
+                    continue 'again;
+                }
+                if swapped && sweep < 4 {
+                    trace(format!("  swapped for {}", describe(&judged)));
+                    chosen[k] = judged.candidate;
+                    self.polish(chosen);
+                    continue 'again;
+                }
+                chosen[k] = judged.candidate.clone();
+                let rivals = ranked.into_iter().skip(1).collect();
+                effects.push(Effect { chosen: judged, rivals, share });
+            }
+            effects.reverse();
+            return effects;
+        }
+    }
+
+    /// The best form of every claim beside the others, best claim first. Claims are ordered by how much of the error they
+    /// explain; the scale is that of the first one's significance.
+    fn rank(&mut self, others: &[Candidate]) -> Vec<Scored> {
+        let grams = &self.grams(others, None);
+        let base = self.scorer.fit(grams);
+        self.scorer.untempered();
+        let mut all = parallel(&self.candidates, &|candidate| self.score(grams, &base, candidate));
+        sort(&mut all);
+        // Effects that begin on the way: the best claims again, with an onset.
+        let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
+        let begun: Vec<Candidate> = distinct(&all)
+            .into_iter()
+            .take(12)
+            .filter(|s| s.gain.nats > 3.0)
+            .flat_map(|s| (1..20).map(move |k| (s.clone(), shortest * f64::from(k) / 20.0)))
+            .map(|(s, onset)| {
+                let mut begun = s.candidate;
+                begun.onset_s = Some(onset);
+                begun.columns.iter_mut().for_each(|column| *column = column.begun_at(self.problem, onset));
+                begun
+            })
+            .filter(Candidate::shows)
+            .collect();
+        all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
+        sort(&mut all);
+        let mut claims = distinct(&all);
+        // Between the grid's points, for those that may win.
+        let best = claims.first().map_or(0.0, |s| s.score);
+        for scored in claims.iter_mut().take(6).filter(|s| s.score > 3.0 && s.score > 0.1 * best) {
+            let candidate = self.refined(grams, &scored.candidate);
+            if let Some(better) = self.score(grams, &base, &candidate)
+                && better.score > scored.score
+            {
+                *scored = better;
+            }
+        }
+        sort(&mut claims);
+        let mut claims = distinct(&claims);
+        if let Some(best) = claims.first().filter(|best| best.gain.nats > 0.0) {
+            let scale = (self.significance(others, &best.candidate).nats.max(0.0) / best.gain.nats).min(1.0);
+            for scored in &mut claims {
+                scored.gain = Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
+                scored.score = scored.gain.nats - price(&scored.candidate);
+            }
+        }
+        sort(&mut claims);
+        parsimonious(&mut claims, self.thresholds.equal);
+        claims
+    }
+
+    fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
+        let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
+        let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+        let gain = self.scorer.gain(base, &fit);
+        within_bounds(candidate, &fit).then(|| Scored { candidate: candidate.clone(), gain, score: gain.nats - price(candidate), coefficients })
+    }
+}
+
+/// What a candidate pays for being one of many or less likely, nats.
+fn price(candidate: &Candidate) -> f64 {
+    candidate.family.penalty_nats + if candidate.onset_s.is_some() { 6.0 } else { 0.0 }
+}
+
+/// Brings the simplest of those that are as good as the best to the front.
+fn parsimonious(claims: &mut [Scored], equal: f64) {
+    let Some(best) = claims.first() else { return };
+    let within = best.score - (equal * best.score.abs()).max(3.0);
+    let simplest = (0..claims.len())
+        .take_while(|k| claims[*k].score >= within)
+        .min_by(|a, b| complexity(&claims[*a].candidate).total_cmp(&complexity(&claims[*b].candidate)));
+    if let Some(k) = simplest {
+        claims[..=k].rotate_right(1);
+    }
+}
+
+/// Numbers that a candidate fits, and between equals what is less usual.
+fn complexity(candidate: &Candidate) -> f64 {
+    let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
+    // What rounds a sign is not a claim of its own.
+    let rounding = candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "crossing")).count();
+    (candidate.columns.len() + shape - rounding + usize::from(candidate.onset_s.is_some())) as f64 + 0.1 * candidate.family.penalty_nats
+}
+
+fn sort(all: &mut [Scored]) {
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
+}
+
+/// The first of every claim.
+fn distinct(sorted: &[Scored]) -> Vec<Scored> {
+    let mut out: Vec<Scored> = Vec::new();
+    for scored in sorted {
+        if !out.iter().any(|o| o.candidate.same_claim(&scored.candidate)) {
+            out.push(scored.clone());
+        }
+    }
+    out
+}
+
+fn parallel(candidates: &[Candidate], score: &(dyn Fn(&Candidate) -> Option<Scored> + Sync)) -> Vec<Scored> {
+    let (left, right) = candidates.split_at(candidates.len() / 2);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| right.iter().filter_map(score).collect::<Vec<_>>());
+        let mut all: Vec<Scored> = left.iter().filter_map(score).collect();
+        all.extend(other.join().expect("no panic in scoring"));
+        all
+    })
+}
+
+/// One line of a trace.
+pub fn describe(scored: &Scored) -> String {
+    let c = &scored.candidate;
+    let family = &c.family;
+    format!(
+        "  {:9.1} ± {:5.1}  {} {:?} ({}) {:?} {:.5?} onset {:?} θ {:.5?}",
+        scored.score,
+        scored.gain.error,
+        family.physics,
+        family.joints.iter().map(|j| j + 1).collect::<Vec<_>>(),
+        family.form,
+        family.shape,
+        c.shape,
+        c.onset_s,
+        scored.coefficients
+    )
+}

@@ -1,0 +1,409 @@
+//! What was found, as a report.
+
+use std::time::{Instant, SystemTime};
+
+use gap_report::{
+    Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature, Fit as FitFigure,
+    FloorMethod, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining, Report,
+    Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict, ranked, timestamp,
+};
+
+use crate::analysis::{Found, Given, Options, Outcome};
+use crate::hypothesis::Candidate;
+use crate::intervals::Estimate;
+use crate::nominal::rms;
+use crate::pictures;
+use crate::problem::{Cell, Channel};
+use crate::robot::Robot;
+use crate::run::Run;
+use crate::search::{Effect, Scored};
+use crate::{experiment, regime};
+
+/// Noise of a cell, from how much it differs three rows apart: half of them by less than noise gives, so that effects, which
+/// change slowly or seldom, do not count (the median of |x| is 0.6745 standard deviations).
+pub fn floor(cell: &Cell) -> f64 {
+    let mut steps: Vec<f64> = cell
+        .rows
+        .windows(4)
+        .zip(cell.residual.windows(4))
+        .filter(|(rows, _)| rows[0].0 == rows[3].0)
+        .map(|(_, y)| (y[3] - y[0]).abs())
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).map_or(0.0, |median| median / 0.6745 / std::f64::consts::SQRT_2)
+}
+
+/// The schema's name of a channel.
+pub(crate) fn told(channel: Channel) -> Told {
+    match channel {
+        Channel::JointTorque => Told::JointTorque,
+        Channel::Transmission => Told::Transmission,
+        Channel::EndEffector => Told::EndEffector,
+    }
+}
+
+/// Joint or axis of a cell, by name.
+pub(crate) fn cell_name(robot: &Robot, cell: &Cell) -> String {
+    match cell.channel {
+        Channel::EndEffector => ["x", "y", "z"][cell.index].to_owned(),
+        _ => robot.joints[cell.index].clone(),
+    }
+}
+
+/// Unit of a cell.
+pub(crate) fn cell_unit(robot: &Robot, cell: &Cell) -> &'static str {
+    match cell.channel {
+        Channel::JointTorque => robot.effort_unit(cell.index),
+        Channel::Transmission => robot.position_unit(cell.index),
+        Channel::EndEffector => "m",
+    }
+}
+
+/// What a cell shows, in words.
+pub(crate) fn cell_quantity(robot: &Robot, cell: &Cell) -> String {
+    let name = cell_name(robot, cell);
+    match cell.channel {
+        Channel::JointTorque => format!("torque of {name}"),
+        Channel::Transmission => format!("motor minus joint position of {name}"),
+        Channel::EndEffector => format!("tip position along {name}"),
+    }
+}
+
+/// The cell in which an effect stands highest above the noise.
+pub(crate) fn main_cell(found: &Found, candidate: &Candidate, theta: &[f64]) -> usize {
+    (0..found.problem.cells.len())
+        .max_by(|a, b| {
+            let height = |c: usize| candidate.rms(c, theta) / found.floors[c].max(1e-300);
+            height(*a).total_cmp(&height(*b))
+        })
+        .unwrap_or(0)
+}
+
+/// A report of runs that are too few or too short.
+pub(crate) fn insufficient(
+    robot: &Robot,
+    runs: &[(Run, Option<Run>)],
+    given: &[Given],
+    options: &Options,
+    data_quality: Vec<DataQuality>,
+    begun: Instant,
+) -> Outcome {
+    let mut report = bare(robot, runs, given, options, data_quality);
+    report.status = Status::InsufficientData;
+    report.timing.total_s = begun.elapsed().as_secs_f64();
+    report.summary = gap_report::headlines(&report).join(" ");
+    Outcome { report, pictures: Pictures::default(), corrected: None }
+}
+
+/// The whole report.
+pub(crate) fn outcome(
+    found: &Found,
+    runs: &[(Run, Option<Run>)],
+    given: &[Given],
+    options: &Options,
+    data_quality: Vec<DataQuality>,
+    corrected: Option<String>,
+) -> Outcome {
+    let robot = found.robot;
+    let mut report = bare(robot, runs, given, options, data_quality);
+    let thresholds = &options.thresholds;
+    let effects = &found.answer.effects;
+    let channels: Vec<Told> = {
+        let mut all: Vec<Told> = found.problem.cells.iter().map(|cell| told(cell.channel)).collect();
+        all.dedup();
+        all
+    };
+    let artifact = corrected.as_ref().map(|text| Artifact::new("corrected.toml", Format::Toml).sha256(sha256(text.as_bytes())));
+    report.inputs.channels = channels.clone();
+    let mut verdicts = Vec::new();
+    for (k, (effect, estimate)) in effects.iter().zip(found.estimates).enumerate() {
+        verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact.clone().expect("an effect has a model")));
+    }
+    if found.unmodelled {
+        verdicts.push(unmodelled(found, effects.len() as u64 + 1));
+    }
+    if verdicts.is_empty() {
+        let next = found.answer.next.as_ref();
+        let nats = next.map_or(0.0, |n| n.gain.nats);
+        let claim = next.map_or("no hypothesis explains anything".to_owned(), |n| {
+            format!("the best of all hypotheses, {}, gains less than is asked for", n.candidate.family.physics.replace('_', " "))
+        });
+        let evidence = Evidence::new("search of the whole library", claim, (nats, "nats"), TestMethod::HeldOutGain);
+        let probability = 1.0 / (1.0 + ((nats - thresholds.nats) / 2.0).exp());
+        verdicts.push(Verdict::none(probability.clamp(0.5, 0.999), channels[0], vec![evidence]));
+    }
+    report.status = match (effects.is_empty(), found.unmodelled) {
+        (true, false) => Status::NoMismatch,
+        (true, true) => Status::Unmodelled,
+        (false, false) => Status::Explained,
+        (false, true) => Status::PartlyExplained,
+    };
+    let detected = report.status != Status::NoMismatch;
+    report.mismatch = Mismatch { detected, p_value: None, excess_rms: excess(found), extra: gap_report::Extra::default() };
+    report.verdicts = ranked(verdicts);
+    report.corrected_model = artifact;
+    report.remaining = remaining(found);
+    report.summary = gap_report::headlines(&report).join(" ");
+    Outcome { report, pictures: pictures::draw(found, runs), corrected }
+}
+
+/// Everything but the answer.
+fn bare(robot: &Robot, runs: &[(Run, Option<Run>)], given: &[Given], options: &Options, data_quality: Vec<DataQuality>) -> Report {
+    let seconds = |run: &Run| run.len() as f64 * run.dt_s;
+    let out = if runs.len() == 1 { 1 } else { (runs.len() / 4).max(1) };
+    let told_runs = runs.iter().zip(given).enumerate().map(|(k, ((real, _), one))| {
+        let rate = 1.0 / real.dt_s;
+        let mut run = if runs.len() == 1 {
+            let start = seconds(real) * 2.0 / 3.0 + 1.0;
+            ToldRun::split(&one.id, (start.min(seconds(real)), seconds(real)), seconds(real), rate, one.real_sha256.clone())
+        } else {
+            let role = if k + out >= runs.len() { RunRole::HeldOut } else { RunRole::Train };
+            ToldRun::new(&one.id, role, seconds(real), rate, one.real_sha256.clone())
+        };
+        run.kind = RunKind::Real;
+        run.samples = Some(real.len() as u64);
+        run.sim_sha256 = one.sim.as_ref().map(|(_, hash)| hash.clone());
+        run
+    });
+    let with_sim = given.iter().any(|one| one.sim.is_some());
+    let access = if with_sim { Access::RecordedOutput } else { Access::Builtin };
+    let name = if with_sim { "recorded simulation" } else { "ravenpose" };
+    Report {
+        schema_version: "1.0.0".to_owned(),
+        report_id: format!("gap-{}", &options.config_sha256[..12]),
+        created: timestamp(SystemTime::now()),
+        tool: Tool::ravenpose(options.config_sha256.clone(), options.seed),
+        inputs: Inputs {
+            robot: gap_report::Robot {
+                name: robot.name.clone(),
+                urdf_sha256: options.urdf_sha256.clone(),
+                joints: robot.joints.clone(),
+                extra: gap_report::Extra::default(),
+            },
+            simulator: Simulator { name: name.to_owned(), version: None, access, extra: gap_report::Extra::default() },
+            runs: told_runs.collect(),
+            channels: vec![Told::JointTorque],
+            extra: gap_report::Extra::default(),
+        },
+        data_quality,
+        status: Status::InsufficientData,
+        summary: String::new(),
+        mismatch: Mismatch { detected: false, p_value: None, excess_rms: Vec::new(), extra: gap_report::Extra::default() },
+        verdicts: Vec::new(),
+        corrected_model: None,
+        remaining: Remaining {
+            library_gain_nats: 0.0,
+            flexible_gain_nats: 0.0,
+            explained_share: None,
+            depends_on: None,
+            fit: None,
+            extra: gap_report::Extra::default(),
+        },
+        calibration: Calibration {
+            null_runs: 0,
+            threshold_nats: options.thresholds.nats,
+            false_alarm_upper95: None,
+            probability_temperature: None,
+            source: None,
+            extra: gap_report::Extra::default(),
+        },
+        timing: Timing {
+            read_s: None,
+            screen_s: None,
+            fit_s: None,
+            simulate_s: None,
+            total_s: 0.0,
+            threads: None,
+            extra: gap_report::Extra::default(),
+        },
+        plots: Vec::new(),
+        sealed_case: None,
+        extra: gap_report::Extra::default(),
+    }
+}
+
+/// Weight of a claim that scores so much less than the best: structural error makes the scale of the scores a share of them.
+fn weight(best: f64, score: f64) -> f64 {
+    ((score - best) / (2.0_f64).max(0.01 * best)).exp()
+}
+
+/// The primary verdict of an effect and its alternatives.
+fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, threshold: f64, artifact: Artifact) -> Vec<Verdict> {
+    let number = k as u64 + 1;
+    let best = effect.chosen.score;
+    let near = (0.01 * best).max(3.0);
+    let close: Vec<&Scored> = effect.rivals.iter().filter(|r| r.score > best - near).take(4).collect();
+    let total = weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0);
+    let probability = weight(best, best) / total;
+    let candidate = &effect.chosen.candidate;
+    let physics = physics(candidate);
+    let location = location(found, candidate, estimate, effect.share);
+    let fit = fits(found, candidate, &estimate.coefficients);
+    let score = Score { folds: Some(found.problem.block_count as u64), threshold_nats: Some(threshold), n_parameters: Some(estimate.parameters.len() as u64), ..Score::new(effect.chosen.gain.nats, effect.chosen.gain.error) };
+    let claim = format!("explains {:.0} % of what is left where it shows most", 100.0 * effect.share);
+    let mut evidence = Evidence::new("held-out gain over all other effects", claim, (effect.chosen.gain.nats, "nats"), TestMethod::HeldOutGain);
+    evidence.effect = None;
+    let mut verdict = Verdict::primary(number, physics.clone(), probability, location.clone(), (told_parameters(found, candidate, estimate), fit, vec![evidence]), artifact);
+    verdict.score = Some(score);
+    if !close.is_empty() {
+        let with: Vec<Confusable> = close
+            .iter()
+            .map(|rival| {
+                let mut one = Confusable::new(self::physics(&rival.candidate), "predicts the held-out data about as well");
+                one.joint = Some(joints(found.robot, &rival.candidate));
+                one.score_difference_nats = Some(best - rival.score);
+                one
+            })
+            .collect();
+        let set = probability + close.iter().map(|r| weight(best, r.score) / total).sum::<f64>();
+        let rivals: Vec<Physics> = std::iter::once(physics).chain(close.iter().map(|r| self::physics(&r.candidate))).collect();
+        verdict = verdict.confusable(with, set.min(1.0), experiment::suggest(found.robot, candidate, &close, rivals));
+    }
+    verdict.summary = Some(gap_report::headline(&verdict));
+    let alternatives = effect.rivals.iter().take(3).filter(|r| weight(best, r.score) / total > 0.005).map(|rival| {
+        let place = Location::new(told(rival.candidate.family.channel), joints(found.robot, &rival.candidate), regime::subsystem(&rival.candidate), regime::regime(&rival.candidate));
+        let numbers = crate::parameters::parameters(found.robot, found.nominal, &rival.candidate, &rival.coefficients, &rival.candidate.shape);
+        let numbers = numbers.into_iter().filter(|n| n.value.is_finite()).map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value])).collect();
+        Verdict::alternative(number, self::physics(&rival.candidate), weight(best, rival.score) / total, place, numbers, Vec::new())
+    });
+    std::iter::once(verdict).chain(alternatives.collect::<Vec<_>>()).collect()
+}
+
+fn physics(candidate: &Candidate) -> Physics {
+    candidate.family.physics.parse().expect("families have names of the vocabulary")
+}
+
+fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Vec<Parameter> {
+    let sliding = candidate.family.joints.first().is_some_and(|j| found.robot.prismatic.get(*j).copied().unwrap_or(false));
+    let motion = if sliding { Motion::Prismatic } else { Motion::Revolute };
+    estimate
+        .parameters
+        .iter()
+        .filter(|(named, interval)| named.value.is_finite() && interval.iter().all(|x| x.is_finite()))
+        .map(|(named, interval)| {
+            let of = Parameter::of(&physics(candidate), named.name, motion, named.value, *interval);
+            let mut parameter = of.unwrap_or_else(|| Parameter::new(named.name, named.value, named.unit, *interval));
+            named.unit.clone_into(&mut parameter.unit);
+            parameter.method(gap_report::CiMethod::Sandwich)
+        })
+        .collect()
+}
+
+/// Names of the joints that an effect is told at.
+pub(crate) fn joints(robot: &Robot, candidate: &Candidate) -> Vec<String> {
+    candidate.family.joints.iter().map(|j| robot.joints[(*j).min(robot.joints.len() - 1)].clone()).collect()
+}
+
+fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f64) -> Location {
+    let cell = &found.problem.cells[main_cell(found, candidate, &estimate.coefficients)];
+    let mut regime = regime::regime(candidate);
+    regime.energy_share = Some(share.clamp(0.0, 1.0));
+    let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), regime::subsystem(candidate), regime);
+    location.energy_share = Some(share.clamp(0.0, 1.0));
+    if let Some((onset, interval)) = estimate.onset_s {
+        location.time_intervals = found
+            .problem
+            .pairs
+            .iter()
+            .map(|pair| {
+                let run = &pair.real.run;
+                let end = run.time_s(run.len() - 1);
+                let mut told = Interval::new(&run.id, (run.start_s + onset).clamp(0.0, end.max(0.0)), end.max(run.start_s + onset));
+                told.start_ci95_s = Some(interval.map(|t| run.start_s + t));
+                told
+            })
+            .collect();
+    }
+    location
+}
+
+/// Residuals of a cell of what was held out, before and after the correction by all effects.
+pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
+    let of = &found.problem.cells[cell];
+    let c = found.held.cell(of.channel, of.index)?;
+    let before = found.held.cells[c].residual.clone();
+    let mut after = before.clone();
+    for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
+        let own = &effect.chosen.candidate;
+        let there = Candidate::new(found.held_dictionary, &own.family, &own.shape, own.onset_s);
+        let predicted = there.effect(c, &estimate.coefficients);
+        after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
+    }
+    Some((c, before, after))
+}
+
+/// Ids of the held-out runs.
+fn held_ids(found: &Found) -> Vec<String> {
+    found.held.pairs.iter().map(|pair| pair.real.run.id.clone()).collect()
+}
+
+fn fits(found: &Found, candidate: &Candidate, theta: &[f64]) -> Vec<FitFigure> {
+    let cell = main_cell(found, candidate, theta);
+    let of = &found.problem.cells[cell];
+    let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
+    let pair = (rms(before.into_iter()), rms(after.into_iter()));
+    let floor = Some((found.floors[cell], FloorMethod::Innovations));
+    vec![FitFigure::rms(cell_quantity(found.robot, of), cell_unit(found.robot, of), Space::EquationError, pair, floor, held_ids(found))]
+}
+
+fn excess(found: &Found) -> Vec<ExcessRms> {
+    found
+        .problem
+        .cells
+        .iter()
+        .enumerate()
+        .map(|(c, cell)| {
+            let size = rms(cell.residual.iter().copied());
+            ExcessRms {
+                channel: told(cell.channel),
+                joint: Some(cell_name(found.robot, cell)),
+                value: (size * size - found.floors[c].powi(2)).max(0.0).sqrt(),
+                unit: cell_unit(found.robot, cell).to_owned(),
+                noise_floor: found.floors[c],
+                n_effective: Some(cell.rows.len() as f64 / found.answer.scorer.correlation[c]),
+                extra: gap_report::Extra::default(),
+            }
+        })
+        .collect()
+}
+
+fn unmodelled(found: &Found, number: u64) -> Verdict {
+    let (c, nats) = found.ceiling.cell.unwrap_or((0, 0.0));
+    let cell = &found.problem.cells[c];
+    let joint = if cell.channel == Channel::EndEffector { Vec::new() } else { vec![cell_name(found.robot, cell)] };
+    let regime = Regime::new(Feature::All, format!("depends on {}", found.ceiling.depends_on.join(", ")));
+    let location = Location::new(told(cell.channel), joint, Subsystem::Unknown, regime);
+    let claim = "a predictor that knows no physics does far better than every hypothesis";
+    let evidence = Evidence::new("flexible ceiling", claim, (nats, "nats"), TestMethod::HeldOutGain);
+    let share = found.ceiling.library_nats.max(0.0) / found.ceiling.together_nats.max(1e-9);
+    Verdict::unmodelled(number, (1.0 - share).clamp(0.5, 0.99), location, evidence)
+}
+
+fn remaining(found: &Found) -> Remaining {
+    let ceiling = found.ceiling;
+    let share = if ceiling.together_nats > 0.0 { (ceiling.library_nats / ceiling.together_nats).clamp(0.0, 1.0) } else { 1.0 };
+    Remaining {
+        library_gain_nats: ceiling.library_nats,
+        flexible_gain_nats: ceiling.together_nats,
+        explained_share: Some(share),
+        depends_on: found.unmodelled.then(|| ceiling.depends_on.iter().map(|d| (*d).to_owned()).collect()),
+        fit: None,
+        extra: gap_report::Extra::default(),
+    }
+}
+
+/// Hash of bytes in lower-case hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    use sha2::{Digest, Sha256};
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The level that makes a report say so first.
+pub(crate) fn failed(quality: &[DataQuality]) -> bool {
+    quality.iter().any(|q| q.level == Level::Fail)
+}
+
+/// For signatures that need nothing else.
+pub(crate) fn experiment_of(goal: &str, rivals: Vec<Physics>, steps: &[&str]) -> Experiment {
+    Experiment::new(goal, rivals, steps.iter().map(|s| (*s).to_owned()).collect())
+}
