@@ -84,8 +84,9 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Optio
     }
     let physics = Physics::new(family.physics, &parameters)?.ok()?;
     let mut effect = Effect::new(physics, bound);
-    if let Some((onset, _)) = estimate.onset_s {
-        effect.from_s = onset;
+    if let Some([from, to]) = estimate.window {
+        effect.from_s = from.map_or(f64::NEG_INFINITY, |(t, _)| t);
+        effect.to_s = to.map_or(f64::INFINITY, |(t, _)| t);
     }
     effect.source = Some(format!("ravenpose gap ({})", family.form));
     Some(effect)

@@ -69,56 +69,53 @@ fn features(dictionary: &Dictionary, cell: &Cell) -> Vec<(&'static str, Vec<f64>
     all
 }
 
-/// Fits the flexible columns on top of a set.
+/// Gain that a further feature has to bring, nats.
+const STEP_NATS: f64 = 4.0;
+/// Most features of a cell.
+const FEATURES: usize = 6;
+
+/// Adds to a set the features that help, one after the other, cell by cell: what is held out decides, so that the ceiling
+/// does not rise by overfitting.
 pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none: &Fit) -> Ceiling {
     let problem = dictionary.problem;
     let library = scorer.fit(grams);
     let mut wide = grams.clone();
-    for (c, cell) in problem.cells.iter().enumerate() {
-        let on_grid = cell.channel != crate::problem::Channel::EndEffector;
-        let columns: Vec<Column> = features(dictionary, cell)
-            .into_iter()
-            .map(|(_, series)| {
-                let mut column = Column::default();
-                column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
-                column
-            })
-            .filter(|column| !column.is_empty())
-            .collect();
-        wide = scorer.extended(&wide, &columns);
+    let mut together = library.clone();
+    scorer.temper(grams, &library);
+    let mut by_cell = vec![(0.0, Vec::new()); problem.cells.len()];
+    for c in 0..problem.cells.len() {
+        let mut columns = cell_columns(dictionary, c);
+        while by_cell[c].1.len() < FEATURES {
+            let scored = columns.iter().enumerate().map(|(k, (_, column))| {
+                let fit = scorer.fit(&scorer.extended(&wide, std::slice::from_ref(column)));
+                (k, scorer.gain(&together, &fit).nats)
+            });
+            let Some((k, nats)) = scored.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, nats)| *nats > STEP_NATS) else { break };
+            let (name, column) = columns.swap_remove(k);
+            wide = scorer.extended(&wide, &[column]);
+            together = scorer.fit(&wide);
+            by_cell[c].0 += nats;
+            by_cell[c].1.push(name);
+            scorer.temper(&wide, &together);
+        }
     }
-    let together = scorer.fit(&wide);
-    scorer.temper(&wide, &together);
     let gain = scorer.gain(&library, &together);
-    let by_cell = scorer.gain_by_cell(&library, &together);
-    let cell = by_cell.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, nats)| *nats > 0.0);
-    let depends_on = cell.map_or_else(Vec::new, |(c, _)| telling(dictionary, scorer, grams, &library, c));
-    Ceiling {
-        library_nats: scorer.gain(none, &library).nats,
-        together_nats: scorer.gain(none, &together).nats.max(scorer.gain(none, &library).nats),
-        least_nats: gain.least.min(gain.nats),
-        cell,
-        depends_on,
-    }
+    let cell = by_cell.iter().enumerate().map(|(c, (nats, _))| (c, *nats)).max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, nats)| *nats > 0.0);
+    let mut depends_on: Vec<&'static str> = cell.map_or_else(Vec::new, |(c, _)| by_cell[c].1.clone());
+    depends_on.dedup();
+    depends_on.truncate(3);
+    let library_nats = scorer.gain(none, &library).nats;
+    Ceiling { library_nats, together_nats: library_nats + gain.nats.max(0.0), least_nats: gain.least.min(gain.nats), cell, depends_on }
 }
 
-/// The features that each alone gain most in a cell.
-fn telling(dictionary: &Dictionary, scorer: &Scorer, grams: &Grams, library: &Fit, c: usize) -> Vec<&'static str> {
+/// Features of one cell as columns.
+fn cell_columns(dictionary: &Dictionary, c: usize) -> Vec<(&'static str, Column)> {
     let cell = &dictionary.problem.cells[c];
     let on_grid = cell.channel != crate::problem::Channel::EndEffector;
-    let mut all: Vec<(&'static str, f64)> = features(dictionary, cell)
-        .into_iter()
-        .filter_map(|(name, series)| {
-            let mut column = Column::default();
-            column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
-            let fit = scorer.fit(&scorer.extended(grams, &[column]));
-            let nats = scorer.gain(library, &fit).nats;
-            (nats > 1.0).then_some((name, nats))
-        })
-        .collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut names: Vec<&'static str> = all.into_iter().map(|(name, _)| name).collect();
-    names.dedup();
-    names.truncate(3);
-    names
+    let column = |series: Vec<f64>| {
+        let mut column = Column::default();
+        column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
+        column
+    };
+    features(dictionary, cell).into_iter().map(|(name, series)| (name, column(series))).filter(|(_, column)| !column.is_empty()).collect()
 }

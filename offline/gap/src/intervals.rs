@@ -1,6 +1,6 @@
-//! 95 % intervals of parameters: leave one block out, shapes and onsets linearised.
+//! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{Candidate, Column, Dictionary};
+use crate::hypothesis::{Candidate, Column, Dictionary, Window};
 use crate::nominal::Nominal;
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
@@ -12,18 +12,32 @@ use crate::search::Effect;
 pub struct Estimate {
     /// Parameters, with their 95 % intervals.
     pub parameters: Vec<(Named, [f64; 2])>,
-    /// Onset, s from the start of each run, with its interval.
-    pub onset_s: Option<(f64, [f64; 2])>,
+    /// Beginning and end, s from the start of each run, with their intervals; none where it does not begin or end in it.
+    pub window: Option<[Option<(f64, [f64; 2])>; 2]>,
     /// Coefficients of the candidate's columns.
     pub coefficients: Vec<f64>,
 }
 
-/// Model error that blocks share and so do not show, as a share of a value: rigid-body numbers of a lab, forms of friction.
-const COMMON: f64 = 0.01;
+/// Model error that blocks share and so do not show, as a share of a value: forms of friction, the smoothing of a sign; and
+/// for what is measured in units of the model's load, the weights that a lab gives its links (measured: docs/proof.md).
+fn common(physics: &str) -> f64 {
+    match physics {
+        "cable_stretch" | "cable_creep" | "cable_hysteresis" | "load_dependent_friction" | "gravity_direction" | "motor_torque_scale" => 0.1,
+        "payload" | "link_inertia" | "external_contact" => 0.06,
+        _ => 0.015,
+    }
+}
+
+/// What a column of the wide fit is the slope of.
+#[derive(Debug, Clone, Copy)]
+enum Slope {
+    Shape(usize),
+    Edge(usize),
+}
 
 /// Estimates of all effects together.
 pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, robot: &Robot, effects: &[Effect]) -> Vec<Estimate> {
-    // First round: coefficients; second: with the slopes by shape and onset.
+    // First round: coefficients; second: with the slopes by shape and window.
     let candidates: Vec<&Candidate> = effects.iter().map(|e| &e.chosen.candidate).collect();
     let plain = candidates.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
     let fit = scorer.fit(&plain);
@@ -47,46 +61,51 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
         .iter()
         .zip(layout)
         .map(|(candidate, (column, theta, which))| {
-            let of = |coefficients: &[f64]| -> (Vec<Named>, Option<f64>) {
+            let of = |coefficients: &[f64]| -> (Vec<Named>, Window) {
                 let own = &coefficients[column..column + theta.len()];
                 let mut shape = candidate.shape.clone();
-                let mut onset = candidate.onset_s;
+                let mut window = candidate.window.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 for (k, which) in which.iter().enumerate() {
                     let moved = coefficients[column + theta.len() + k] - wide.coefficients[column + theta.len() + k];
                     match which {
-                        Some(number) => shape[*number] += moved,
-                        None => onset = onset.map(|t| t + moved),
+                        Slope::Shape(number) => shape[*number] += moved,
+                        Slope::Edge(edge) => window[*edge] += moved,
                     }
                 }
                 // Deviations are taken from the wide fit, values from the plain one.
                 let at: Vec<f64> = own.iter().zip(&wide.coefficients[column..]).zip(&theta).map(|((x, w), t)| t + x - w).collect();
-                (parameters(robot, nominal, candidate, &at, &shape), onset)
+                (parameters(robot, nominal, candidate, &at, &shape), window)
             };
-            let (values, onset) = of(&wide.coefficients);
-            let replicates: Vec<(Vec<Named>, Option<f64>)> = wide.without.iter().map(|c| of(c)).collect();
-            let spread = |of: &dyn Fn(&(Vec<Named>, Option<f64>)) -> f64| -> f64 {
+            let (values, _) = of(&wide.coefficients);
+            let replicates: Vec<(Vec<Named>, Window)> = wide.without.iter().map(|c| of(c)).collect();
+            let spread = |of: &dyn Fn(&(Vec<Named>, Window)) -> f64| -> f64 {
                 let mean = replicates.iter().map(of).sum::<f64>() / blocks;
                 replicates.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>().sqrt()
             };
+            let common = common(candidate.family.physics);
             let parameters = values
                 .iter()
                 .enumerate()
                 .map(|(k, named)| {
-                    let half = (reach * spread(&|r| r.0[k].value)).hypot(COMMON * named.value);
+                    let half = (reach * spread(&|r| r.0[k].value)).hypot(common * named.value);
                     (named.clone(), [named.value - half, named.value + half])
                 })
                 .collect();
-            let onset_s = onset.map(|t| {
-                let half = (reach * spread(&|r| r.1.unwrap_or(t))).max(0.01);
-                (t, [t - half, t + half])
+            let window = candidate.window.map(|window| {
+                [0, 1].map(|edge| {
+                    let t = window[edge];
+                    // An edge is known to the smoothing at best.
+                    let half = (reach * spread(&|r| r.1[edge])).max(0.02);
+                    t.is_finite().then_some((t, [t - half, t + half]))
+                })
             });
-            Estimate { parameters, onset_s, coefficients: theta }
+            Estimate { parameters, window, coefficients: theta }
         })
         .collect()
 }
 
-/// Change of the effect per unit of each refined number of its shape, and of its onset (none).
-fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<(Option<usize>, Column)> {
+/// Change of the effect per unit of each refined number of its shape, and of each edge of its window.
+fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<(Slope, Column)> {
     let family = &candidate.family;
     let mut all = Vec::new();
     for (k, step) in family.steps.iter().enumerate() {
@@ -98,14 +117,19 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
         let at = |sign: f64| {
             let mut shape = candidate.shape.clone();
             shape[k] += sign * step;
-            Candidate::new(dictionary, family, &shape, candidate.onset_s)
+            Candidate::new(dictionary, family, &shape, candidate.window)
         };
-        all.push((Some(k), difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
+        all.push((Slope::Shape(k), difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
     }
-    if let Some(onset) = candidate.onset_s {
+    for edge in 0..2 {
+        let Some(window) = candidate.window.filter(|window| window[edge].is_finite()) else { continue };
         let step = 0.04;
-        let at = |onset: f64| Candidate::new(dictionary, family, &candidate.shape, Some(onset));
-        all.push((None, difference(&at(onset + step), &at(onset - step), theta, 2.0 * step)));
+        let at = |sign: f64| {
+            let mut moved = window;
+            moved[edge] += sign * step;
+            Candidate::new(dictionary, family, &candidate.shape, Some(moved))
+        };
+        all.push((Slope::Edge(edge), difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
     }
     all.retain(|(_, column)| !column.is_empty());
     all

@@ -10,6 +10,9 @@ use crate::robot::Robot;
 /// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
 const DRIVE_COLUMNS: usize = 4;
 
+/// Rounds between torque and deflection.
+const ROUNDS: usize = 4;
+
 /// A nominal model.
 #[derive(Debug, Clone)]
 pub struct Nominal {
@@ -53,11 +56,12 @@ impl Nominal {
     /// simulator's own deflection does, so both are fitted together, the compliance first from the robot's own weights.
     pub fn learn(robot: &Robot, runs: &[Motion]) -> Self {
         let mut nominal = Self::of(robot);
-        for _ in 0..2 {
-            nominal.learn_deflection(robot, runs);
+        // The scale of the load comes from the torque alone, its finer shape from the deflection too.
+        nominal.compliance.fill([0.0; 2]);
+        for _ in 0..ROUNDS {
             nominal.learn_torque(robot, runs);
+            nominal.learn_deflection(robot, runs);
         }
-        nominal.learn_deflection(robot, runs);
         nominal
     }
 

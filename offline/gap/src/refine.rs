@@ -8,6 +8,8 @@ use crate::hypothesis::{Candidate, Dictionary, Family};
 const HALVINGS: usize = 7;
 /// Times that secants are drawn to the last coefficients.
 const SECANTS: usize = 4;
+/// First step of an edge, of its time.
+const EDGE_S: f64 = 0.1;
 /// Rounds over all numbers of a shape.
 const ROUNDS: usize = 2;
 
@@ -29,7 +31,7 @@ pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidat
 /// Misfit of a candidate and its coefficients; infinite where they may not be.
 pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + 'a;
 
-/// The candidate with its refinable numbers, and its onset, moved to where the misfit is least.
+/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least.
 pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
     let misfit = &|candidate: &Candidate| fitted(candidate).0;
     let family = &start.family;
@@ -38,12 +40,12 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
     if family.secant {
         for _ in 0..SECANTS {
             let shape = fitted(&best).1[..family.shape.len()].to_vec();
-            best = Candidate::new(dictionary, family, &shape, best.onset_s);
+            best = Candidate::new(dictionary, family, &shape, best.window);
         }
         least = misfit(&best);
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
-    let rounds = if free.len() + usize::from(best.onset_s.is_some()) > 1 { ROUNDS } else { 1 };
+    let rounds = if free.len() + best.edges() > 1 { ROUNDS } else { 1 };
     for _ in 0..rounds {
         for &k in &free {
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
@@ -56,21 +58,22 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
                     }
                     let mut shape = best.shape.clone();
                     shape[k] = there;
-                    try_one(Candidate::new(dictionary, family, &shape, best.onset_s), &mut best, &mut least, misfit);
+                    try_one(Candidate::new(dictionary, family, &shape, best.window), &mut best, &mut least, misfit);
                 }
                 step *= 0.5;
             }
         }
-        if let Some(onset) = best.onset_s {
-            let mut step = 0.4 * onset.max(1.0) / 4.0;
-            let mut at = onset;
+        for edge in 0..2 {
+            let Some(window) = best.window.filter(|window| window[edge].is_finite()) else { continue };
+            let mut step = EDGE_S * window[edge].clamp(1.0, 8.0);
             for _ in 0..HALVINGS + 2 {
-                for there in [at - step, at + step] {
-                    if there > 0.0 {
-                        try_one(Candidate::new(dictionary, family, &best.shape, Some(there)), &mut best, &mut least, misfit);
+                for sign in [-1.0, 1.0] {
+                    let mut moved = best.window.unwrap_or(window);
+                    moved[edge] += sign * step;
+                    if moved[0] < moved[1] && moved[edge] > 0.0 {
+                        try_one(Candidate::new(dictionary, family, &best.shape, Some(moved)), &mut best, &mut least, misfit);
                     }
                 }
-                at = best.onset_s.unwrap_or(at);
                 step *= 0.5;
             }
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, library};
+use crate::hypothesis::{Candidate, Dictionary, Family, Window, library};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -29,6 +29,11 @@ impl Default for Thresholds {
         Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.005, effects: 4 }
     }
 }
+
+/// Steps of the grid of windows in a run.
+const EDGES: usize = 12;
+/// Claims that are tried in windows.
+const CLAIMS_IN_WINDOWS: usize = 14;
 
 /// A candidate with what it gains beside the others chosen.
 #[derive(Debug, Clone)]
@@ -290,21 +295,12 @@ impl Search<'_, '_> {
         self.scorer.untempered();
         let mut all = parallel(&self.candidates, &|candidate| self.score(grams, &base, candidate));
         sort(&mut all);
-        // Effects that begin on the way: the best claims again, with an onset.
-        let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
-        let begun: Vec<Candidate> = distinct(&all)
-            .into_iter()
-            .take(12)
-            .filter(|s| s.gain.nats > 3.0)
-            .flat_map(|s| (1..20).map(move |k| (s.clone(), shortest * f64::from(k) / 20.0)))
-            .map(|(s, onset)| {
-                let mut begun = s.candidate;
-                begun.onset_s = Some(onset);
-                begun.columns.iter_mut().for_each(|column| *column = column.begun_at(self.problem, onset));
-                begun
-            })
-            .filter(Candidate::shows)
-            .collect();
+        // Effects that begin or end on the way: the claims that do something, again, in windows.
+        let begun: Vec<Candidate> = {
+            let windows = self.windows();
+            let worth = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.gain.nats > 3.0);
+            worth.flat_map(|s| windows.iter().map(move |w| (s.candidate.clone(), *w))).map(|(c, w)| c.within(self.problem, w)).filter(Candidate::shows).collect()
+        };
         all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
         sort(&mut all);
         let mut claims = distinct(&all);
@@ -338,6 +334,15 @@ impl Search<'_, '_> {
         claims
     }
 
+    /// Windows to begin with: a beginning, an end, or both.
+    fn windows(&self) -> Vec<Window> {
+        let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
+        let at = |k: usize| shortest * k as f64 / EDGES as f64;
+        let ends = (1..EDGES).flat_map(|k| [[at(k), f64::INFINITY], [f64::NEG_INFINITY, at(k)]]);
+        let both = (1..EDGES - 2).step_by(2).flat_map(|i| (i + 2..EDGES).step_by(2).map(move |j| [at(i), at(j)]));
+        ends.chain(both).collect()
+    }
+
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
         let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
@@ -348,7 +353,7 @@ impl Search<'_, '_> {
 
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
-    candidate.family.penalty_nats + if candidate.onset_s.is_some() { 6.0 } else { 0.0 }
+    candidate.family.penalty_nats + 5.0 * candidate.edges() as f64
 }
 
 /// Brings the simplest of those that are as good as the best to the front.
@@ -368,7 +373,7 @@ fn complexity(candidate: &Candidate) -> f64 {
     let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
     // What rounds a sign is not a claim of its own.
     let rounding = candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "crossing")).count();
-    (candidate.columns.len() + shape - rounding + usize::from(candidate.onset_s.is_some())) as f64 + 0.1 * candidate.family.penalty_nats
+    (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
 }
 
 fn sort(all: &mut [Scored]) {
@@ -401,7 +406,7 @@ pub fn describe(scored: &Scored) -> String {
     let c = &scored.candidate;
     let family = &c.family;
     format!(
-        "  {:9.1} ± {:5.1}  {} {:?} ({}) {:?} {:.5?} onset {:?} θ {:.5?}",
+        "  {:9.1} ± {:5.1}  {} {:?} ({}) {:?} {:.5?} {:?} θ {:.5?}",
         scored.score,
         scored.gain.error,
         family.physics,
@@ -409,7 +414,7 @@ pub fn describe(scored: &Scored) -> String {
         family.form,
         family.shape,
         c.shape,
-        c.onset_s,
+        c.window,
         scored.coefficients
     )
 }

@@ -143,7 +143,8 @@ pub(crate) fn outcome(
     report.verdicts = ranked(verdicts);
     report.corrected_model = artifact;
     report.remaining = remaining(found);
-    report.summary = gap_report::headlines(&report).join(" ");
+    let failed = report.data_quality.iter().filter(|q| q.level == Level::Fail).map(gap_report::quality_headline);
+    report.summary = failed.chain(gap_report::headlines(&report)).collect::<Vec<_>>().join(" ");
     Outcome { report, pictures: pictures::draw(found, runs), corrected }
 }
 
@@ -300,21 +301,20 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
     regime.energy_share = Some(share.clamp(0.0, 1.0));
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), regime::subsystem(candidate), regime);
     location.energy_share = Some(share.clamp(0.0, 1.0));
-    if let Some((onset, interval)) = estimate.onset_s {
-        location.time_intervals = found
-            .problem
-            .pairs
-            .iter()
-            .map(|pair| {
-                let run = &pair.real.run;
-                let end = run.time_s(run.len() - 1);
-                let mut told = Interval::new(&run.id, (run.start_s + onset).clamp(0.0, end.max(0.0)), end.max(run.start_s + onset));
-                told.start_ci95_s = Some(interval.map(|t| run.start_s + t));
-                told
-            })
-            .collect();
+    if let Some(window) = &estimate.window {
+        location.time_intervals = found.problem.pairs.iter().map(|pair| interval(&pair.real.run, window)).collect();
     }
     location
+}
+
+/// A window in a run, on the run's own clock.
+fn interval(run: &Run, window: &[Option<(f64, [f64; 2])>; 2]) -> Interval {
+    let (first, last) = (run.start_s.max(0.0), run.time_s(run.len() - 1).max(0.0));
+    let at = |edge: &Option<(f64, [f64; 2])>, open: f64| edge.map_or(open, |(t, _)| (run.start_s + t).clamp(first, last));
+    let mut told = Interval::new(&run.id, at(&window[0], first), at(&window[1], last));
+    let ci = |edge: &Option<(f64, [f64; 2])>| edge.map(|(_, ci)| ci.map(|t| (run.start_s + t).max(0.0)));
+    (told.start_ci95_s, told.end_ci95_s) = (ci(&window[0]), ci(&window[1]));
+    told
 }
 
 /// Residuals of a cell of what was held out, before and after the correction by all effects.
@@ -325,7 +325,7 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
     let mut after = before.clone();
     for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
         let own = &effect.chosen.candidate;
-        let there = Candidate::new(found.held_dictionary, &own.family, &own.shape, own.onset_s);
+        let there = Candidate::new(found.held_dictionary, &own.family, &own.shape, own.window);
         let predicted = there.effect(c, &estimate.coefficients);
         after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
     }
@@ -396,11 +396,6 @@ fn remaining(found: &Found) -> Remaining {
 pub fn sha256(bytes: &[u8]) -> String {
     use sha2::{Digest, Sha256};
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// The level that makes a report say so first.
-pub(crate) fn failed(quality: &[DataQuality]) -> bool {
-    quality.iter().any(|q| q.level == Level::Fail)
 }
 
 /// For signatures that need nothing else.

@@ -105,7 +105,7 @@ impl Acting {
             "cable_creep" => Act::Creep { compliance: v("J_k"), time: v("T_k") },
             "outside:cubic_stiffness" => Act::Cubic(v("cubic")),
             "outside:cable_slack" => Act::Slack(v("pretension")),
-            "joint_coupling" => Act::Coupling { from: v("from") as usize - 1, gain: v("c_ij") },
+            "joint_coupling" => Act::Coupling { from: v("from") as usize - 1, gain: -v("c_ij") },
             "transmission_ratio" => Act::Ratio { gain: v("e"), home: v("home") },
             "joint_offset" => Act::Offset(v("o")),
             "pulley_eccentricity" => Act::Eccentric([v("e_over_r"), v("period"), v("phi")]),

@@ -4,6 +4,8 @@ use super::dictionary::Dictionary;
 use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
+/// Speed below which a joint creeps, of its RMS speed.
+const CREEPING: f64 = 0.1;
 /// Most waves per motor turn.
 const ORDERS: u32 = 64;
 
@@ -27,17 +29,21 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 Family::shaped("torque_ripple", &[j], "motor turns", TORQUE, &[Bound::Free, Bound::Free], &[("order", false)], product(&[&orders]), move |d, s| {
                     [0.0, std::f64::consts::FRAC_PI_2].map(|phase| d.effort_of(j, ripple(d, j, s[0], phase), false)).to_vec()
                 })
-                .penalised(4.0),
+                .penalised(15.0),
             );
         }
     }
 }
 
-/// A wave so many times per turn of the motor, smoothed as the torque is: what turns fast is gone from both.
+/// A wave so many times per turn of the motor, smoothed as the torque is: what turns fast is gone from both. Where the joint
+/// creeps or holds nothing is claimed: a standing wave is a constant, and many constants explain anything.
 fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64> {
     dictionary.smoothed(|r| {
-        let motor = dictionary.problem.pairs[r].real.run.motor.as_ref();
-        motor.map_or_else(Vec::new, |motor| motor[j].iter().map(|angle| (order * angle + phase).sin()).collect())
+        let motion = &dictionary.problem.pairs[r].real;
+        let usual = crate::nominal::rms(motion.quick_velocity[j].iter().copied());
+        let moving = |v: &f64| f64::from(u8::from(v.abs() > CREEPING * usual));
+        let wave = |motor: &Vec<Vec<f64>>| motor[j].iter().zip(&motion.quick_velocity[j]).map(|(angle, v)| (order * angle + phase).sin() * moving(v)).collect();
+        motion.run.motor.as_ref().map_or_else(Vec::new, wave)
     })
 }
 

@@ -4,6 +4,9 @@ use arm::serial::Workspace;
 
 use crate::problem::{Channel, Problem};
 
+/// From when to when an effect is there, s from the start of each run; infinite where it does not begin or end in it.
+pub type Window = [f64; 2];
+
 /// One coefficient's part in every residual: `(cell, values)`, absent where it has none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Column {
@@ -27,13 +30,14 @@ impl Column {
         }
     }
 
-    /// The same, begun at `onset_s` of each run.
+    /// The same within a window of each run only, s from its start.
     #[must_use]
-    pub fn begun_at(&self, problem: &Problem, onset_s: f64) -> Self {
+    pub fn within(&self, problem: &Problem, [from_s, to_s]: Window) -> Self {
         let parts = self.parts.iter().map(|(cell, values)| {
             let rows = &problem.cells[*cell].rows;
             let begun = values.iter().zip(rows).map(|(x, &(r, i))| {
-                if i as f64 * problem.pairs[r].real.run.dt_s >= onset_s { *x } else { 0.0 }
+                let t = i as f64 * problem.pairs[r].real.run.dt_s;
+                if t >= from_s && t < to_s { *x } else { 0.0 }
             });
             (*cell, begun.collect())
         });

@@ -11,7 +11,7 @@ mod transmission;
 
 use std::sync::Arc;
 
-pub use dictionary::{Column, Dictionary};
+pub use dictionary::{Column, Dictionary, Window};
 pub use environment::normals;
 
 use crate::problem::Channel;
@@ -143,29 +143,41 @@ impl Family {
     }
 }
 
-/// A family at one shape and onset, its columns made.
+/// A family at one shape and window, its columns made.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// What it says.
     pub family: Arc<Family>,
     /// Numbers that fix its shape, in the family's order.
     pub shape: Vec<f64>,
-    /// Seconds from the start of each run at which it begins; none: always there.
-    pub onset_s: Option<f64>,
+    /// When it is there; none: always.
+    pub window: Option<Window>,
     /// One per coefficient.
     pub columns: Vec<Column>,
 }
 
 impl Candidate {
     /// Makes the columns.
-    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], onset_s: Option<f64>) -> Self {
+    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], window: Option<Window>) -> Self {
         let mut columns = (family.columns)(dictionary, shape);
-        if let Some(onset) = onset_s {
+        if let Some(window) = window {
             for column in &mut columns {
-                *column = column.begun_at(dictionary.problem, onset);
+                *column = column.within(dictionary.problem, window);
             }
         }
-        Self { family: family.clone(), shape: shape.to_vec(), onset_s, columns }
+        Self { family: family.clone(), shape: shape.to_vec(), window, columns }
+    }
+
+    /// Numbers of its window that lie in the runs.
+    pub fn edges(&self) -> usize {
+        self.window.map_or(0, |window| window.iter().filter(|t| t.is_finite()).count())
+    }
+
+    /// The same within a window.
+    #[must_use]
+    pub fn within(&self, problem: &crate::problem::Problem, window: Window) -> Self {
+        let columns = self.columns.iter().map(|column| column.within(problem, window)).collect();
+        Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns }
     }
 
     /// A number of its shape.

@@ -54,7 +54,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         &[("crossing", true)],
         product(&[&CROSSING.map(|share| share * usual)]),
         move |d, s| vec![d.deflection_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
-    ));
+    ).penalised(1.5));
 }
 
 /// How far the motor runs ahead of a joint with play.
@@ -188,13 +188,13 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
     let (small, free) = (Bound::Between(-0.5, 0.5), Bound::Free);
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
-    all.push(Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]));
+    all.push(Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5));
     all.push(Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
         // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
         let mut column = ratio(d);
         column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
         vec![column]
-    }));
+    }).penalised(0.5));
     all.push(
         Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, free], move |d| {
             vec![ratio(d), offset(d, j)]
@@ -220,7 +220,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     for i in (0..dictionary.joints()).filter(|i| *i != j) {
         let coupled = move |d: &Dictionary| d.deflection_of(j, position(d, i));
         let pair = [j, i];
-        all.push(Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]));
+        all.push(Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]).penalised(1.0));
         all.push(
             Family::fixed("joint_coupling", &pair, "position about a place", TRANSMISSION, &[small, Bound::Free], move |d| {
                 vec![coupled(d), offset(d, j)]
@@ -232,6 +232,6 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let mut column = coupled(d);
             column.push(d.problem.cell(Channel::JointTorque, i), minus(&d.load(j)));
             vec![column]
-        }));
+        }).penalised(1.0));
     }
 }
