@@ -5,10 +5,13 @@ mod common;
 
 use gap_report::{Fit, Interval, Parameter, Physics, Report, Role, RunRole, Space, Status, check};
 
+/// No finding.
+const NOTHING: [String; 0] = [];
+
 /// A report with one fault must give a finding that says so, and nothing without the fault.
 fn caught(says: &str, base: fn() -> Report, fault: impl Fn(&mut Report)) {
     let mut report = base();
-    assert_eq!(check(&report), [String::new(); 0]);
+    assert_eq!(check(&report), NOTHING);
     fault(&mut report);
     let found = check(&report);
     assert!(found.iter().any(|finding| finding.contains(says)), "expected `{says}`, found {found:#?}");
@@ -33,7 +36,7 @@ fn intervals_hold_their_values() {
         report.verdicts[0].evidence[1].effect.as_mut().expect("effect").ci95 = Some([0.0, 1.0]);
     });
     caught("removed_fraction_ci95", common::explained, |report| {
-        report.verdicts[0].fit[0].removed_fraction_ci95 = Some([0.99, 1.0])
+        report.verdicts[0].fit[0].removed_fraction_ci95 = Some([0.99, 1.0]);
     });
 }
 
@@ -68,7 +71,7 @@ fn parameters_are_those_of_the_vocabulary() {
     let mut report = common::explained();
     report.verdicts[0].physics = Physics::Plugin("drag".to_owned());
     report.verdicts[0].parameters = vec![Parameter::new("c_w", 0.4, "1", [0.3, 0.5])];
-    assert_eq!(check(&report), [String::new(); 0]);
+    assert_eq!(check(&report), NOTHING);
 }
 
 #[test]

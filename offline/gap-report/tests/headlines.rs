@@ -25,11 +25,14 @@ fn said(physics: &Physics, joints: &[&str], values: &[(&str, f64)]) -> String {
     headline(&verdict(physics, joints, Motion::Revolute, values))
 }
 
+/// Physics, joints, parameters, sentence.
+type Case = (Physics, &'static [&'static str], &'static [(&'static str, f64)], &'static str);
+
 #[test]
 fn each_physics_says_what_the_robot_has() {
     use Physics as P;
-    let elbow: &[&str] = &["elbow"];
-    let cases: Vec<(P, &[&str], &[(&str, f64)], &str)> = vec![
+    let elbow: &'static [&'static str] = &["elbow"];
+    let cases: Vec<Case> = vec![
         (
             P::CoulombFriction,
             elbow,

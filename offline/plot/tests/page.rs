@@ -386,3 +386,27 @@ fn the_recordings_at_hand_are_drawn() {
         }
     }
 }
+
+#[test]
+fn names_stand_at_their_places_and_do_not_touch() {
+    let names = (0..40).map(|i| (f64::from(i), format!("run-{i:02}")));
+    let cells =
+        plot::figure::Cells { x: (0.0, 39.0), y: (0.0, 2.0), columns: 3, values: vec![0.2, 1.0, 4.0, f64::NAN, 2.0, 400.0] };
+    let mark = Mark::Cells { cells, ramp: plot::figure::Ramp::Ratio { most: 4.0 }, title: String::new() };
+    let rows =
+        Axis::new("Joint").names([(0.5, "insertion".to_owned()), (1.5, "a name that is too long".to_owned())]).range(0.0, 2.0);
+    let figure = Figure::new("Heat", Axis::new("Runs").names(names).range(0.0, 39.0)).panel(Panel::new(rows).mark(mark));
+    let drawn = svg(&figure);
+    let document = parsed(&drawn);
+    let found = texts(&document, "text");
+    assert!(found.contains(&"insertion".to_owned()) && found.contains(&"a name that i…".to_owned()), "{found:?}");
+    let runs = found.iter().filter(|text| text.starts_with("run-")).count();
+    assert!((3..10).contains(&runs), "{found:?}");
+    // Noise and less in the first colour, the end of the scale and more in the last, what is missing in none.
+    let class = |name: &str| document.descendants().filter(|node| node.attribute("class") == Some(name)).count();
+    assert_eq!((class("h0"), class("h15"), class("h8")), (1, 1, 1));
+    assert!(!found.iter().any(|text| text == "400"), "no bar");
+    let legend = plot::figure::ratio_legend(12.0);
+    assert_eq!(texts(&parsed(&legend), "text"), ["noise", "1", "2", "5", "10", "× noise"]);
+    assert!(!plot::figure::ratio_legend(0.5).contains("NaN"));
+}

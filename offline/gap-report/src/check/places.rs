@@ -99,9 +99,7 @@ fn held_out_only(report: &Report, fit: &Fit, place: &str, findings: &mut Finding
         let role = report.inputs.runs.iter().find(|run| run.id == *id).map(|run| run.role);
         match role {
             Some(RunRole::HeldOut | RunRole::Split) => {}
-            Some(role) => {
-                findings.0.push(format!("{place}: run `{id}` has the role {role}; fits are judged on held_out or split runs only"))
-            }
+            Some(role) => findings.0.push(format!("{place}: run `{id}` has the role {role}; fits need held_out or split runs")),
             None => findings.0.push(format!("{place}: there is no run `{id}` in inputs.runs")),
         }
     }

@@ -54,7 +54,7 @@ pub(crate) fn heat_maps(group: &[&HeatMap], most: f64, width_px: f64) -> Figure 
         [one] => Axis::new(format!("Time in {}, s", one.run)).range(one.start_s, one.start_s + length(one)),
         _ => Axis::new("Runs, one after another").names(names(runs, &starts, px_per_s)).range(0.0, (end - gap).max(1e-9)),
     };
-    let mut figure = Figure::new("Error of the simulation, in units of noise", x).width(width_px);
+    let mut figure = Figure::new("Error in units of noise", x).width(width_px);
     for map in group {
         let rows = map.rows.len();
         let row_names = map.rows.iter().rev().enumerate().map(|(i, name)| (i as f64 + 0.5, name.replace('_', " ")));

@@ -3,7 +3,9 @@
 use super::fits::fit;
 use super::tags::{HALF_PX, around, figure, list, section, table, text};
 use crate::figures::{before_after, channel_title, signature, spectrum};
-use crate::text::{Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, short};
+use crate::text::{
+    Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, short, with_unit,
+};
 use crate::{Confusable, Evidence, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
 
 /// All effects.
@@ -85,28 +87,34 @@ fn place(verdict: &Verdict) -> String {
     text("p", "", &said.join(" "))
 }
 
+/// Values with their intervals; what is the same for all is left out.
 fn parameters(physics: &Physics, parameters: &[Parameter]) -> String {
+    let again = parameters.iter().any(|parameter| parameter.output_error_value.is_some());
+    let sure = parameters.iter().all(|parameter| determined(parameter) == "yes");
     let row = |parameter: &Parameter| {
         let estimate = Estimate::new(parameter.value, parameter.ci95, &parameter.unit);
-        let mut known = match parameter.identifiable {
-            Identifiable::Yes => "yes",
-            Identifiable::Weak => "roughly",
-            Identifiable::No => "no",
-        }
-        .to_owned();
-        if parameter.at_bound == Some(true) {
-            known += ", at a limit of the search";
-        }
-        vec![parameter_name(physics, &parameter.name), estimate.plain(), estimate.interval(), known]
+        let by_loop = parameter.output_error_value.map_or_else(String::new, |value| with_unit(value, &parameter.unit));
+        let name = parameter_name(physics, &parameter.name);
+        let mut row = vec![name, estimate.plain(), estimate.interval()];
+        row.extend(again.then_some(by_loop));
+        row.extend((!sure).then(|| determined(parameter)));
+        row
     };
-    let mut rows: Vec<Vec<String>> = parameters.iter().map(row).collect();
-    let mut header = vec!["", "Value", "95 % interval", "Determined"];
-    // Nothing to say where all is well.
-    if rows.iter().all(|row| row[3] == "yes") {
-        rows.iter_mut().for_each(|row| row.truncate(3));
-        header.truncate(3);
-    }
-    table(1, &header, rows)
+    let mut header = vec!["", "Value", "95 % interval"];
+    header.extend(again.then_some("In the loop"));
+    header.extend((!sure).then_some("Determined"));
+    table(1, &header, parameters.iter().map(row).collect())
+}
+
+/// Do the data say it?
+fn determined(parameter: &Parameter) -> String {
+    let known = match parameter.identifiable {
+        Identifiable::Yes => "yes",
+        Identifiable::Weak => "roughly",
+        Identifiable::No => "no",
+    };
+    let limit = if parameter.at_bound == Some(true) { ", at a limit" } else { "" };
+    format!("{known}{limit}")
 }
 
 /// What it may be instead, and what would decide.

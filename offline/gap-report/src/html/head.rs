@@ -57,13 +57,13 @@ pub(super) fn tiles(report: &Report) -> String {
         let floor = format!("noise alone {}", as_given(worst.noise_floor, &worst.unit));
         tiles.push(Tile::new(&name, as_given(worst.value, &worst.unit), &floor));
     }
-    let resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);
-    if let Some(effect) = resolution.filter_map(|test| test.effect.as_ref()).next() {
+    let mut resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);
+    if let Some(effect) = resolution.find_map(|test| test.effect.as_ref()) {
         tiles.push(Tile::new("Visible from", as_given(effect.value, &effect.unit), "less would not show"));
     }
     if let Some(verdict) = first {
         let set = verdict.set_probability.filter(|set| *set > verdict.probability);
-        let set = set.map_or_else(String::new, |set| format!("{} with its look-alikes", probability(set)));
+        let set = set.map_or_else(String::new, |set| format!("{} with look-alikes", probability(set)));
         tiles.push(Tile::new("Confidence", probability(verdict.probability), &set));
     }
     tiles.push(Tile::new("Held out", held_out(report), "not used for fitting"));

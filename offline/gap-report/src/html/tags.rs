@@ -32,7 +32,9 @@ pub(super) fn figure(draw: impl Fn(f64) -> Figure, wide_px: f64) -> String {
         let caption = if figure.caption.is_empty() { String::new() } else { text("figcaption", "", &figure.caption) };
         format!("<figure class=\"{class}\">{}{caption}</figure>", svg(figure))
     };
-    one("wide", &draw(wide_px)) + &one("narrow", &draw(NARROW_PX))
+    // Paper is wide enough for the widest.
+    let [wide, narrow] = if wide_px < WIDE_PX { ["wide", "narrow"] } else { ["wide full", "narrow full"] };
+    one(wide, &draw(wide_px)) + &one(narrow, &draw(NARROW_PX))
 }
 
 /// Something folded.

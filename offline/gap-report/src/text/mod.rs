@@ -1,5 +1,6 @@
 //! The report in words: numbers, units, sentences, the text for a terminal.
 
+mod amount;
 mod headline;
 mod joints;
 mod number;

@@ -87,7 +87,11 @@ impl Estimate {
 
     /// `11.3 to 12.9`.
     pub(crate) fn interval(&self) -> String {
-        if self.unit == "°" { format!("{}° to {}°", self.low, self.high) } else { format!("{} to {}", self.low, self.high) }
+        if self.unit == "°" {
+            format!("{}°\u{a0}to\u{a0}{}°", self.low, self.high)
+        } else {
+            format!("{}\u{a0}to\u{a0}{}", self.low, self.high)
+        }
     }
 }
 
@@ -181,7 +185,7 @@ mod tests {
 
     #[test]
     fn shares_and_times_read_well() {
-        let plain = |text: String| text.replace('\u{a0}', " ").replace('\u{202f}', " ");
+        let plain = |text: String| text.replace(['\u{a0}', '\u{202f}'], " ");
         assert_eq!(plain(percent(0.987)), "99 %");
         assert_eq!(plain(percent(0.045)), "4.5 %");
         assert_eq!(plain(probability(0.999)), "> 99 %");

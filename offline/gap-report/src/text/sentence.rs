@@ -1,10 +1,11 @@
 //! One sentence per physics: what the robot has and the simulation lacks, where, how much. They start with a small letter and
 //! end without a full stop, so that others can be built around them.
 
+use super::amount::{amount, amount_in, degrees, per_cent, size};
 use super::joints::{joint, joints};
-use super::number::{Estimate, percent, short, with_unit};
+use super::number::{percent, short, with_unit};
 use super::unit::Scale;
-use crate::{Channel, Feature, Identifiable, Location, Parameter, Physics, Subsystem, Verdict};
+use crate::{Channel, Feature, Location, Parameter, Physics, Subsystem, Verdict};
 
 /// What a verdict says.
 pub(crate) fn sentence(verdict: &Verdict) -> String {
@@ -63,39 +64,6 @@ fn when(location: &Location) -> String {
 
 /// A verdict read for its numbers.
 struct Facts<'a>(&'a Verdict);
-
-/// Radians as degrees.
-fn degrees() -> Scale {
-    Scale { name: "°".to_owned(), per_unit: 180.0 / std::f64::consts::PI }
-}
-
-/// Plain numbers as per cent.
-fn per_cent() -> Scale {
-    Scale { name: "%".to_owned(), per_unit: 100.0 }
-}
-
-/// `about` before what the data do not determine well.
-fn hedged(parameter: &Parameter, estimate: &Estimate) -> String {
-    let about = if parameter.identifiable == Identifiable::Yes { "" } else { "about " };
-    format!("{about}{}", estimate.with_interval())
-}
-
-/// Size without its sign; the interval turns with it.
-fn size(parameter: &Parameter) -> Parameter {
-    let [low, high] = parameter.ci95;
-    match parameter.value < 0.0 {
-        true => Parameter { value: -parameter.value, ci95: [-high, -low], ..parameter.clone() },
-        false => parameter.clone(),
-    }
-}
-
-fn amount(parameter: &Parameter) -> String {
-    hedged(parameter, &Estimate::new(parameter.value, parameter.ci95, &parameter.unit))
-}
-
-fn amount_in(parameter: &Parameter, scale: &Scale) -> String {
-    hedged(parameter, &Estimate::scaled(parameter.value, parameter.ci95, scale))
-}
 
 impl Facts<'_> {
     fn parameter(&self, name: &str) -> Option<&Parameter> {
@@ -193,9 +161,10 @@ impl Facts<'_> {
 
     fn ripple(&self, at: &str) -> String {
         // Orders are whole numbers, known or fitted.
-        let times = |order: &Parameter| match (order.value - order.value.round()).abs() < 0.05 {
-            true => format!(", {:.0} times per turn", order.value),
-            false => format!(", {} times per turn", short(order.value)),
+        let times = |order: &Parameter| {
+            let whole = (order.value - order.value.round()).abs() < 0.05;
+            let count = if whole { format!("{:.0}", order.value) } else { short(order.value) };
+            format!(", {count} times per turn")
         };
         let order = self.parameter("order").map_or_else(String::new, times);
         format!("the motor torque of {at} ripples{}{order}, which the simulation lacks", self.with(" by ", "amp"))
@@ -223,10 +192,8 @@ impl Facts<'_> {
         });
         let twist = self.parameter("d_alpha").map(|twist| format!("is twisted by {}", amount_in(&size(twist), &degrees())));
         let both: Vec<String> = [length, twist].into_iter().flatten().collect();
-        match both.is_empty() {
-            true => format!("the link at {at} has another shape than in the simulation"),
-            false => format!("the link at {at} {} against the simulation", both.join(" and ")),
-        }
+        let how = if both.is_empty() { "has another shape".to_owned() } else { both.join(" and ") };
+        format!("the link at {at} {how} against the simulation")
     }
 
     fn delay(&self) -> String {

@@ -92,8 +92,8 @@ fn experiment(experiment: &Experiment) -> String {
 
 /// How large an effect would have been seen, or how far above noise the residuals are.
 fn agreement(report: &Report) -> Option<String> {
-    let tests = report.told().flat_map(|verdict| &verdict.evidence);
-    if let Some(effect) = tests.filter_map(|test| test.effect.as_ref()).next() {
+    let mut tests = report.told().flat_map(|verdict| &verdict.evidence);
+    if let Some(effect) = tests.find_map(|test| test.effect.as_ref()) {
         return Some(format!("an effect of {} would have been seen", as_given(effect.value, &effect.unit)));
     }
     let worst = report.mismatch.excess_rms.iter().max_by(|a, b| (a.value / a.noise_floor).total_cmp(&(b.value / b.noise_floor)))?;

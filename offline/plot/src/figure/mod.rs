@@ -16,12 +16,14 @@ mod colour;
 pub mod decimate;
 mod draw;
 mod layout;
+mod legend;
 mod mark;
 mod scale;
 mod xml;
 
 pub use colour::{Colour, HEAT_LEVELS, STYLE};
-pub use draw::{ratio_legend, svg, svg_document};
+pub use draw::{svg, svg_document};
+pub use legend::ratio_legend;
 pub use mark::{Cells, Mark, Ramp};
 pub use scale::{Axis, Ticks, number, ticks};
 pub use xml::escape;
