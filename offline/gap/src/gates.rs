@@ -2,6 +2,8 @@
 
 use gap_report::{DataQuality, Level};
 
+use recordings::Recording;
+
 use crate::motion::Motion;
 use crate::nominal::{Nominal, rms};
 use crate::robot::Robot;
@@ -16,6 +18,7 @@ pub fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     for (real, sim) in runs {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
+        all.extend(gaps(real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
         }
@@ -101,6 +104,30 @@ fn repeated(run: &Run) -> Option<DataQuality> {
         let message = format!("{share:.1} % of the samples in motion repeat the one before: polled faster than updated");
         DataQuality::new("duplicates", Level::Warn, message).run(run.id.clone()).value(share, "%")
     })
+}
+
+/// Samples that were not recorded.
+fn gaps(run: &Run) -> Vec<DataQuality> {
+    let share = 100.0 * run.mask.iter().filter(|masked| **masked).count() as f64 / run.len().max(1) as f64;
+    let masked = (share > 0.0).then(|| {
+        let message = format!("{share:.1} % of the samples were not recorded (empty cells, lost rows) and are left out");
+        let level = if share > 1.0 { Level::Warn } else { Level::Ok };
+        DataQuality::new("gaps", level, message).run(run.id.clone()).value(share, "%")
+    });
+    let left_out = run.left_out.iter().map(|name| {
+        let message = format!("more than half of the cells of {name} are empty: this channel is not looked at");
+        DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
+    });
+    masked.into_iter().chain(left_out).collect()
+}
+
+/// Joints of a recording that the robot does not have.
+pub fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<DataQuality> {
+    let n = robot.joint_count();
+    let has = |j: usize| ["mpos_J_rad", "jpos_J_rad", "jpos_J_m", "q_J_rad", "q_J_m"].iter().any(|name| recording.column(&name.replace('J', &j.to_string())).is_some());
+    let last = (n + 1..=99).take_while(|j| has(*j)).last()?;
+    let message = format!("the recording has {last} joints, the robot {} has {n}: those beyond are not looked at; their weight and their couplings are missing", robot.name);
+    Some(DataQuality::new("joints", Level::Warn, message).run(run).value(last as f64, "1"))
 }
 
 /// A simulation that does not move as the recording does.

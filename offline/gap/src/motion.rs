@@ -69,8 +69,18 @@ impl Motion {
         let margin = window.margin();
         let step = ((band.step_s / run.dt_s).round() as usize).max(1);
         let usable = margin..run.len().saturating_sub(margin);
+        // A row whose window touches what was not recorded says nothing.
+        let mut bridged = Vec::with_capacity(run.len() + 1);
+        bridged.push(0_usize);
+        bridged.extend(run.mask.iter().scan(0, |sum, masked| { *sum += usize::from(*masked); Some(*sum) }));
+        let seen = |i: usize| bridged[(i + margin + 1).min(run.len())] == bridged[i.saturating_sub(margin)];
+        let mut rows: Vec<usize> = usable.clone().step_by(step).filter(|i| seen(*i)).collect();
+        // The first two tell how far rows are apart.
+        while rows.len() > 1 && rows[1] - rows[0] != step {
+            rows.remove(0);
+        }
         let tip_rows = run.tip.as_ref().map_or_else(Vec::new, |tip| {
-            usable.clone().filter(|&i| tip.iter().all(|axis| axis[i].is_finite())).collect::<Vec<_>>()
+            usable.clone().filter(|&i| seen(i) && tip.iter().all(|axis| axis[i].is_finite())).collect::<Vec<_>>()
         });
         // A tip at every sample is thinned like the rest.
         let tip_rows = if tip_rows.len() * 2 > usable.len() { tip_rows.into_iter().step_by(step).collect() } else { tip_rows };
@@ -82,7 +92,7 @@ impl Motion {
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
             slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
             deflection: deflection.as_ref().map(|d| smooth(d, 0)),
-            rows: usable.step_by(step).collect(),
+            rows,
             tip_rows,
             window,
             run,

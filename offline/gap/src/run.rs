@@ -5,9 +5,68 @@ use recordings::Recording;
 
 use crate::robot::Robot;
 
+/// Longest stretch without a value that is bridged by a line; what lies around a longer one is left out, s.
+const HOLE_S: f64 = 0.005;
+/// The same for joint encoders: they are bridged as the difference to the motor, which changes slowly, s.
+const HOLE_OF_TRUTH_S: f64 = 0.025;
+/// A channel that would leave less than this share of a run is left out instead.
+const KEEP: f64 = 0.5;
+/// Samples of the uniform clock per row of the file at most: further apart, a time is taken for wrong.
+const SPREAD: f64 = 20.0;
+
 /// Why a recording cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RunError {
+    /// Fewer than two rows.
+    #[error("{run}: has {rows} rows; record at least 9 s, better two runs of 30 s")]
+    Rows {
+        /// File of the run.
+        run: String,
+        /// Their number.
+        rows: usize,
+    },
+    /// Time that is not one.
+    #[error("{run}: row {row} after the header: {what}")]
+    Time {
+        /// File of the run.
+        run: String,
+        /// Row, from 1.
+        row: usize,
+        /// What is wrong and what would do.
+        what: String,
+    },
+    /// A joint of another kind.
+    #[error("{run}: has {column}, but joint {joint} of the robot {robot} {moves}; give the robot of this recording with --robot")]
+    OtherJoint {
+        /// File of the run.
+        run: String,
+        /// The column that tells.
+        column: String,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// The robot.
+        robot: String,
+        /// What the robot's joint does.
+        moves: &'static str,
+    },
+    /// A sensor that says nothing.
+    #[error("{run}: {column} is the same in every row although {moving}; leave the column out if it was not recorded, or mend the sensor")]
+    Constant {
+        /// File of the run.
+        run: String,
+        /// The column.
+        column: String,
+        /// Why it should not be.
+        moving: String,
+    },
+    /// A robot that stands still.
+    #[error("{run}: nothing moves: {column} and every other position is the same in every row; record while all joints move")]
+    Still {
+        /// File of the run.
+        run: String,
+        /// The first position.
+        column: String,
+    },
     /// A table without a time.
     #[error("{run}: has no column t_s; give a run with time, not a table")]
     NoTime {
@@ -29,10 +88,16 @@ pub enum RunError {
         joints: usize,
     },
     /// Nothing overlaps.
-    #[error("{run}: its time and that of its simulation do not overlap; give the runs in the same order")]
+    #[error("{sim}: its time ({sim_s}) and that of the recording {run} ({run_s}) do not overlap; give the runs in the same order, on one clock")]
     NoOverlap {
         /// File of the run.
         run: String,
+        /// Its first and last time.
+        run_s: String,
+        /// File of the simulation.
+        sim: String,
+        /// Its first and last time.
+        sim_s: String,
     },
 }
 
@@ -57,6 +122,10 @@ pub struct Run {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
     pub tip: Option<[Vec<f64>; 3]>,
+    /// Samples that were not recorded, in which the series are bridged: nothing may be concluded from them.
+    pub mask: Vec<bool>,
+    /// Columns left out because most of their cells are empty.
+    pub left_out: Vec<String>,
 }
 
 impl Run {
@@ -83,8 +152,13 @@ impl Run {
         let run = recording.name.clone();
         let time = recording.time_s().ok_or_else(|| RunError::NoTime { run: run.clone() })?;
         let n = robot.joint_count();
-        let clock = Clock::new(time);
-        let series = |name: &str| recording.column(name).map(|column| clock.resample(time, column));
+        let clock = Clock::of(&run, time)?;
+        same_kinds(&run, recording, robot)?;
+        // A column without a single value is not there.
+        let series = |name: &str| {
+            let column = recording.column(name).filter(|column| column.iter().any(|x| x.is_finite()))?;
+            Some(clock.resample(time, column))
+        };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
         // The first of the names that every joint has.
         let all = |names: &[&dyn Fn(usize) -> String]| {
@@ -127,17 +201,124 @@ impl Run {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
             _ => None,
         };
-        Ok(Self {
+        let mut made = Self {
             id: run,
             start_s: clock.start_s,
             dt_s: clock.dt_s,
+            mask: vec![false; position[0].len()],
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
             truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
-        })
+            left_out: Vec::new(),
+        };
+        made.alive(robot)?;
+        made.bridge();
+        Ok(made)
+    }
+
+    /// A sensor that is the same in every row while its joint moves is broken or was not recorded.
+    fn alive(&self, robot: &Robot) -> Result<(), RunError> {
+        let moves: Vec<bool> = self.position.iter().map(|series| !constant(series)).collect();
+        let name = |quantity: &str, j: usize, unit: &str| format!("{quantity}_{}_{unit}", j + 1);
+        let Some(moving) = moves.iter().position(|moves| *moves) else {
+            let column = if self.motor.is_some() { name("mpos", 0, "rad") } else { name("jpos", 0, robot.position_unit(0)) };
+            return Err(RunError::Still { run: self.id.clone(), column });
+        };
+        let dead = |column: String, moving: usize| {
+            Err(RunError::Constant { run: self.id.clone(), column, moving: format!("joint {} moves", moving + 1) })
+        };
+        for j in (0..moves.len()).filter(|j| moves[*j]) {
+            if self.torque.as_ref().is_some_and(|torque| constant(&torque[j])) {
+                return dead(format!("the torque of joint {}", j + 1), j);
+            }
+            if self.truth.as_ref().is_some_and(|truth| constant(&truth[j])) {
+                return dead(name("truth_jpos", j, robot.position_unit(j)), j);
+            }
+        }
+        if self.tip.as_ref().is_some_and(|tip| tip.iter().all(|axis| constant(axis))) {
+            return dead("the measured tip (truth_x, truth_y, truth_z)".to_owned(), moving);
+        }
+        Ok(())
+    }
+
+    /// Draws lines over cells that are empty, and marks those that are too long to be believed.
+    fn bridge(&mut self) {
+        let dt_s = self.dt_s;
+        for series in &mut self.position {
+            mark(&mut self.mask, &bridged(series, dt_s, HOLE_S));
+        }
+        let length = self.mask.len();
+        // A channel that is mostly not there must not take the others with it.
+        let mut keep = |name: &str, holes: Vec<bool>, mask: &mut Vec<bool>| {
+            let kept = (holes.iter().filter(|hole| !**hole).count() as f64) >= KEEP * length as f64;
+            if kept {
+                mark(mask, &holes);
+            } else {
+                self.left_out.push(name.to_owned());
+            }
+            kept
+        };
+        if let Some(torque) = &mut self.torque {
+            let mut holes = vec![false; length];
+            torque.iter_mut().for_each(|series| mark(&mut holes, &bridged(series, dt_s, HOLE_S)));
+            if !keep("tau", holes, &mut self.mask) {
+                self.torque = None;
+            }
+        }
+        if let Some(truth) = &mut self.truth {
+            let mut holes = vec![false; length];
+            for (truth, position) in truth.iter_mut().zip(&self.position) {
+                let mut deflection: Vec<f64> = position.iter().zip(&*truth).map(|(m, q)| m - q).collect();
+                mark(&mut holes, &bridged(&mut deflection, dt_s, HOLE_OF_TRUTH_S));
+                truth.iter_mut().zip(position).zip(deflection).filter(|((q, _), _)| q.is_nan()).for_each(|((q, m), d)| *q = m - d);
+            }
+            if !keep("truth_jpos", holes, &mut self.mask) {
+                self.truth = None;
+            }
+        }
+        for set in [&mut self.command, &mut self.motor].into_iter().flatten() {
+            for series in set {
+                let _ = bridged(series, dt_s, HOLE_S);
+            }
+        }
+    }
+
+    /// The same at other times: samples `dt_s` apart from `start_s` on, `count` of them, all within the run.
+    fn at(&self, start_s: f64, dt_s: f64, count: usize) -> Self {
+        let first = (start_s - self.start_s) / self.dt_s;
+        let step = dt_s / self.dt_s;
+        let last = self.len() - 1;
+        let places: Vec<(usize, f64)> = (0..count)
+            .map(|i| {
+                let at = (first + i as f64 * step).clamp(0.0, last as f64);
+                // On a sample but for rounding.
+                let at = if (at - at.round()).abs() < 1e-3 { at.round() } else { at };
+                (at as usize, at.fract())
+            })
+            .collect();
+        let value = |s: &[f64], (k, share): (usize, f64)| {
+            let next = s[(k + 1).min(last)];
+            let between = if share == 0.0 { s[k] } else { s[k] + share * (next - s[k]) };
+            if between.is_finite() || share == 0.0 { between } else if share < 0.5 { s[k] } else { next }
+        };
+        let series = |s: &Vec<f64>| places.iter().map(|place| value(s, *place)).collect::<Vec<f64>>();
+        let set = |set: &Vec<Vec<f64>>| set.iter().map(series).collect::<Vec<_>>();
+        Self {
+            id: self.id.clone(),
+            start_s,
+            dt_s,
+            position: set(&self.position),
+            torque: self.torque.as_ref().map(set),
+            truth: self.truth.as_ref().map(set),
+            command: self.command.as_ref().map(set),
+            motor: self.motor.as_ref().map(set),
+            tip: self.tip.as_ref().map(|tip| tip.each_ref().map(series)),
+            mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
+            left_out: self.left_out.clone(),
+        }
     }
 
     /// The samples from `from` up to `to`.
@@ -154,24 +335,85 @@ impl Run {
             command: self.command.as_ref().map(cut),
             motor: self.motor.as_ref().map(cut),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
+            mask: self.mask[from..to].to_vec(),
+            left_out: self.left_out.clone(),
         }
     }
 }
 
-/// The common stretch of a recording and its simulation, sample for sample.
+/// Is every value that is there the same?
+fn constant(series: &[f64]) -> bool {
+    let mut values = series.iter().filter(|x| x.is_finite());
+    values.next().is_none_or(|first| values.all(|x| x == first))
+}
+
+fn mark(mask: &mut [bool], holes: &[bool]) {
+    mask.iter_mut().zip(holes).for_each(|(mask, hole)| *mask |= hole);
+}
+
+/// Draws a line over each stretch of NaN, holds the ends; true where a stretch is longer than `hole_s`. A single sample never
+/// is, but at the ends.
+pub(crate) fn bridged(series: &mut [f64], dt_s: f64, hole_s: f64) -> Vec<bool> {
+    let mut holes = vec![false; series.len()];
+    let mut i = 0;
+    while i < series.len() {
+        if series[i].is_finite() {
+            i += 1;
+            continue;
+        }
+        let end = series[i..].iter().position(|x| x.is_finite()).map_or(series.len(), |k| i + k);
+        let (before, after) = (i.checked_sub(1).map(|k| series[k]), series.get(end).copied());
+        let count = end - i;
+        let long = before.is_none() || after.is_none() || (count > 1 && count as f64 * dt_s > hole_s);
+        for k in i..end {
+            holes[k] = long;
+            series[k] = match (before, after) {
+                (Some(a), Some(b)) => a + (b - a) * (k + 1 - i) as f64 / (count + 1) as f64,
+                (Some(held), None) | (None, Some(held)) => held,
+                (None, None) => 0.0,
+            };
+        }
+        i = end;
+    }
+    holes
+}
+
+/// Refuses a recording of a robot whose joints turn where this one's slide.
+fn same_kinds(run: &str, recording: &Recording, robot: &Robot) -> Result<(), RunError> {
+    for (j, prismatic) in robot.prismatic.iter().enumerate() {
+        let (own, other, moves) = if *prismatic { ("m", "rad", "slides") } else { ("rad", "m", "turns") };
+        for quantity in ["jpos", "jpos_d", "truth_jpos", "q"] {
+            let name = |unit: &str| format!("{quantity}_{}_{unit}", j + 1);
+            if recording.column(&name(other)).is_some() && recording.column(&name(own)).is_none() {
+                let (run, robot) = (run.to_owned(), robot.name.clone());
+                return Err(RunError::OtherJoint { run, column: name(other), joint: j + 1, robot, moves });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.
 ///
 /// # Errors
 /// [`RunError::NoOverlap`].
 pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
-    let start = real.start_s.max(sim.start_s);
-    let end = real.time_s(real.len() - 1).min(sim.time_s(sim.len() - 1));
-    let count = ((end - start) / real.dt_s + 1.5).floor();
-    if count < 2.0 || (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s {
-        return Err(RunError::NoOverlap { run: real.id.clone() });
+    let end_s = |run: &Run| run.time_s(run.len() - 1);
+    let end = end_s(real).min(end_s(sim));
+    // The recording's first sample that the simulation has too.
+    let first = ((sim.start_s - real.start_s) / real.dt_s - 1e-3).ceil().max(0.0);
+    let start = real.start_s + first * real.dt_s;
+    let count = ((end - start) / real.dt_s + 1.0 + 1e-3).floor();
+    if count < 2.0 || first as usize >= real.len() {
+        let span = |run: &Run| format!("{:.3} to {:.3} s", run.start_s, end_s(run));
+        return Err(RunError::NoOverlap { run: real.id.clone(), run_s: span(real), sim: sim.id.clone(), sim_s: span(sim) });
     }
-    let first = |run: &Run| ((start - run.start_s) / run.dt_s).round() as usize;
-    let count = (count as usize).min(real.len() - first(real)).min(sim.len() - first(sim));
-    Ok((real.slice(first(real), first(real) + count), sim.slice(first(sim), first(sim) + count)))
+    let first = first as usize;
+    let count = (count as usize).min(real.len() - first);
+    let (mut real, mut sim) = (real.slice(first, first + count), sim.at(start, real.dt_s, count));
+    mark(&mut real.mask, &sim.mask);
+    sim.mask.clone_from(&real.mask);
+    Ok((real, sim))
 }
 
 /// Rows of a matrix times a set of series.
@@ -200,6 +442,29 @@ struct Clock {
 }
 
 impl Clock {
+    /// A clock for these times, which have to be fit for one.
+    fn of(run: &str, time: &[f64]) -> Result<Self, RunError> {
+        if time.len() < 2 {
+            return Err(RunError::Rows { run: run.to_owned(), rows: time.len() });
+        }
+        let wrong = |row: usize, what: String| Err(RunError::Time { run: run.to_owned(), row: row + 1, what });
+        if let Some(row) = time.iter().position(|t| !t.is_finite()) {
+            return wrong(row, "has no time; remove the row".to_owned());
+        }
+        if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            let (before, now) = (time[k], time[k + 1]);
+            return wrong(k + 1, format!("time {now} s does not rise above {before} s; sort the rows and drop repeated times"));
+        }
+        let clock = Self::new(time);
+        if clock.count as f64 > SPREAD * time.len() as f64 {
+            let widest = time.windows(2).enumerate().max_by(|a, b| (a.1[1] - a.1[0]).total_cmp(&(b.1[1] - b.1[0])));
+            let k = widest.map_or(0, |(k, _)| k);
+            let (before, now) = (time[k], time[k + 1]);
+            return wrong(k + 1, format!("time jumps from {before} s to {now} s; make two runs of the recording"));
+        }
+        Ok(clock)
+    }
+
     fn new(time: &[f64]) -> Self {
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
@@ -210,7 +475,8 @@ impl Clock {
         Self { start_s, dt_s, count, uniform }
     }
 
-    /// Linear between samples; a sample next to an empty cell stays empty.
+    /// Linear between rows that follow one another; where rows were lost, NaN. Beside an empty cell, the nearer row within half
+    /// a period: a camera's frames stay what they are.
     fn resample(&self, time: &[f64], values: &[f64]) -> Vec<f64> {
         if self.uniform {
             return values.to_vec();
@@ -222,8 +488,13 @@ impl Clock {
                 while k + 2 < time.len() && time[k + 1] < t {
                     k += 1;
                 }
-                let share = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
-                values[k] + share * (values[k + 1] - values[k])
+                let (step, share) = (time[k + 1] - time[k], ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0));
+                let between = values[k] + share * (values[k + 1] - values[k]);
+                if between.is_finite() && step <= 1.75 * self.dt_s {
+                    return between;
+                }
+                let near = if share < 0.5 { k } else { k + 1 };
+                if (time[near] - t).abs() <= 0.5 * self.dt_s { values[near] } else { f64::NAN }
             })
             .collect()
     }
