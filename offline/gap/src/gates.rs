@@ -13,7 +13,7 @@ use crate::run::Run;
 const MOVING: f64 = 0.05;
 
 /// Checks the runs; failures first.
-pub fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+pub(crate) fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     let mut all = input_sign(robot, runs);
     for (real, sim) in runs {
         all.extend(standing(robot, real));
@@ -122,7 +122,7 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
 }
 
 /// Joints of a recording that the robot does not have.
-pub fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<DataQuality> {
+pub(crate) fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<DataQuality> {
     let n = robot.joint_count();
     let has = |j: usize| ["mpos_J_rad", "jpos_J_rad", "jpos_J_m", "q_J_rad", "q_J_m"].iter().any(|name| recording.column(&name.replace('J', &j.to_string())).is_some());
     let last = (n + 1..=99).take_while(|j| has(*j)).last()?;
@@ -150,7 +150,7 @@ fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
 }
 
 /// How well the tool's own model follows the simulator.
-pub fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
+pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
     if sims.is_empty() {
         return Vec::new();
     }
