@@ -128,29 +128,32 @@ enum Command {
         #[arg(long)]
         seconds: Option<f64>,
     },
-    /// Runs of a simulated RAVEN-II: full states at 1 kHz and where the arm really was
+    /// Runs of a simulated robot at 1 kHz and where the arm really was: full states of a RAVEN-II, tables of any other arm
     Simulate {
         /// Length of all runs together
-        #[arg(long)]
-        minutes: f64,
+        #[arg(long, required_unless_present = "commands", conflicts_with = "commands")]
+        minutes: Option<f64>,
         /// Everything follows from it
-        #[arg(long)]
-        seed: u64,
-        /// Folder to write run_0001.mcap, ... into
+        #[arg(long, required_unless_present = "commands")]
+        seed: Option<u64>,
+        /// Folder to write run_0001.mcap (or .csv), ... into
         #[arg(long)]
         out: PathBuf,
-        /// Robot or plant file, or raven2-nominal (the default) or raven2-worn
+        /// Robot file, plant file or URDF, or raven2-nominal (the default) or raven2-worn
         #[arg(long)]
         robot: Option<String>,
+        /// Follow the commands of these recordings (jpos_d) instead of trajectories from the seed; run K is recording K
+        #[arg(long, num_args = 1..)]
+        commands: Vec<PathBuf>,
         /// Connected arms
         #[arg(long, default_value = "gold", value_parser = ["gold", "green", "both"])]
         arm: String,
         /// What they do
         #[arg(long, default_value = "mixed", value_parser = ["mixed", "teleoperation", "zigzag"])]
         motion: String,
-        /// Format of the runs
-        #[arg(long, default_value = "mcap", value_parser = ["mcap", "bag", "parquet", "csv", "csv.gz", "252.csv", "txt", "rvs"])]
-        format: String,
+        /// Format of the runs: mcap for a RAVEN-II, csv for others, unless told otherwise
+        #[arg(long, value_parser = ["mcap", "bag", "parquet", "csv", "csv.gz", "252.csv", "txt", "rvs"])]
+        format: Option<String>,
         /// Longest run; each run homes the robot anew
         #[arg(long, default_value_t = 5.0)]
         run_minutes: f64,
@@ -199,15 +202,16 @@ fn main() -> ExitCode {
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds } => record::run(&out, seconds),
-        Command::Simulate { minutes, seed, out, robot, arm, motion, format, run_minutes, threads } => {
+        Command::Simulate { minutes, seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {
                 minutes,
                 seed,
                 out: &out,
                 robot: robot.as_deref(),
+                commands: &commands,
                 arm: &arm,
                 motion: &motion,
-                format: &format,
+                format: format.as_deref(),
                 run_minutes,
                 threads,
             })

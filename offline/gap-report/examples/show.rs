@@ -1,19 +1,23 @@
-//! `cargo run --release -p ravenpose-gap-report --example show OUT_DIR`: the two reports of the specification with made-up
-//! pictures, to look at; their words go to the terminal.
+//! `cargo run --release -p ravenpose-gap-report --example show OUT_DIR`: the two reports of the specification and one of every
+//! other kind, with made-up pictures, to look at; their words go to the terminal.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
 
 use std::path::Path;
 
-use gap_report::{BeforeAfter, Channel, HeatMap, HeatRun, Pictures, Quantity, Report, Share, Signature, Spectrum, check, words, write};
-
-const EXPLAINED: &str = include_str!("../tests/data/gap-report.example.json");
-const NONE: &str = include_str!("../tests/data/gap-report.example-none.json");
+use gap_report::{BeforeAfter, Channel, HeatMap, HeatRun, Pictures, Quantity, Share, Signature, Spectrum, check, words, write};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = std::env::args().nth(1).ok_or("usage: show OUT_DIR")?;
-    for (name, text, mismatch) in [("explained", EXPLAINED, true), ("none", NONE, false)] {
-        let report: Report = serde_json::from_str(text)?;
+    for (name, report) in common::all() {
         let folder = Path::new(&out).join(name);
-        write(&report, &pictures(mismatch), &folder)?;
+        let pictures = match name {
+            "explained" => pictures(true),
+            "none" => pictures(false),
+            _ => Pictures::default(),
+        };
+        write(&report, &pictures, &folder)?;
         println!("{}:\n\n{}", folder.join("report.html").display(), words(&report));
         for violation in check(&report) {
             println!("  {violation}");
@@ -87,7 +91,9 @@ fn friction(noise: &mut Noise) -> Signature {
     let before = velocity.iter().map(|v| (*v, 12.1 * side(*v) + 2.7 * noise.normal())).collect();
     let after = velocity.iter().map(|v| (*v, 2.9 * noise.normal())).collect();
     let half = |sign: f64| vec![(sign * 0.0008, sign * 12.1), (sign * 0.04, sign * 12.1)];
-    let band = |sign: f64| vec![(sign * 0.0008, sign * 12.1 - 0.8, sign * 12.1 + 0.8), (sign * 0.04, sign * 12.1 - 0.8, sign * 12.1 + 0.8)];
+    let band = |sign: f64| {
+        vec![(sign * 0.0008, sign * 12.1 - 0.8, sign * 12.1 + 0.8), (sign * 0.04, sign * 12.1 - 0.8, sign * 12.1 + 0.8)]
+    };
     Signature {
         effect: 1,
         feature: Quantity::new("Velocity of the insertion joint", "m/s"),
@@ -139,7 +145,10 @@ fn runs(noise: &mut Noise) -> Vec<BeforeAfter> {
 fn spectrum(noise: &mut Noise) -> Spectrum {
     let frequency_hz: Vec<f64> = (0..200).map(|i| 0.1 * 10_f64.powf(f64::from(i) / 199.0 * 2.6)).collect();
     let mut of = |size: f64| -> Vec<f64> {
-        frequency_hz.iter().map(|f| size / (1.0 + f * f) * (0.2 * noise.normal()).exp() + 0.02 * (0.2 * noise.normal()).exp()).collect()
+        frequency_hz
+            .iter()
+            .map(|f| size / (1.0 + f * f) * (0.2 * noise.normal()).exp() + 0.02 * (0.2 * noise.normal()).exp())
+            .collect()
     };
     Spectrum {
         effect: None,

@@ -55,7 +55,7 @@ physics! {
     TransmissionRatio "transmission_ratio" "another transmission ratio";
     PulleyEccentricity "pulley_eccentricity" "a pulley that runs out of true";
     LinkGeometry "link_geometry" "a link of another shape";
-    MeasurementDelay "measurement_delay" "a delay of the measurement";
+    MeasurementDelay "measurement_delay" "measurement delay";
     FrameMisalignment "frame_misalignment" "a camera frame that is turned or shifted";
     ExternalContact "external_contact" "contact with something outside";
     ThermalDrift "thermal_drift" "drift with temperature";

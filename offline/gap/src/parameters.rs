@@ -83,7 +83,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("a", "1", shaped("a")),
             named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0]),
             named("z_m", position, shaped("yield") * theta[0]),
-            named("n", "1", 1.0),
+            named("n", "1", shaped("n")),
             named("g", "1", 0.5),
         ],
         ("cable_creep", _) => vec![named("J_k", unit("rad/(N.m)", "m/N"), theta[0]), named("T_k", "s", shaped("T_k"))],

@@ -26,7 +26,7 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.02, effects: 4 }
+        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.005, effects: 4 }
     }
 }
 
@@ -50,8 +50,20 @@ pub struct Effect {
     pub chosen: Scored,
     /// The best of every other claim in its place, beside the other effects, best first.
     pub rivals: Vec<Scored>,
+    /// Its significance beside the other effects.
+    pub gain: Gain,
     /// Largest share of a cell's squared error that it removes beside the others.
     pub share: f64,
+}
+
+/// How a candidate stands beside others.
+#[derive(Debug, Clone, Copy)]
+struct Judged {
+    gain: Gain,
+    /// Largest share of a cell that it removes.
+    share: f64,
+    /// Its RMS over the largest other effect's where it removes as much as is asked; infinite beside nothing.
+    amplitude: f64,
 }
 
 /// The search's answer.
@@ -109,13 +121,13 @@ pub fn search<'p>(
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
         let mut accepted = None;
         for scored in ranked.into_iter().take(5) {
-            let (judged, share, amplitude) = search.judged(&base, &chosen, scored);
-            trace(format!("  judged: {} removes {:.1} %, amplitude {amplitude:.2}", describe(&judged), 100.0 * share));
-            if search.accepts(&judged, share, amplitude) {
-                accepted = Some(judged);
+            let judged = search.judged(&base, &chosen, &scored);
+            trace(format!("  judged: {} {judged:.2?}", describe(&scored)));
+            if search.accepts(&scored, &judged) {
+                accepted = Some(scored);
                 break;
             }
-            next = next.or(Some(judged));
+            next = next.or(Some(scored));
         }
         let Some(best) = accepted else { break };
         next = None;
@@ -136,9 +148,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// Gain with the correlation that the model itself leaves, the share of a cell that it removes, and its RMS over the
-    /// largest other effect's where it removes as much as is asked.
-    fn judged(&mut self, base: &Grams, others: &[Candidate], scored: Scored) -> (Scored, f64, f64) {
+    fn judged(&mut self, base: &Grams, others: &[Candidate], scored: &Scored) -> Judged {
         let before = self.scorer.fit(base);
         let grams = self.scorer.extended(base, &scored.candidate.columns);
         let after = self.scorer.fit(&grams);
@@ -158,8 +168,7 @@ impl Search<'_, '_> {
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
             .fold(0.0, f64::max);
         let share = shares.into_iter().fold(0.0, f64::max);
-        let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
-        (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)
+        Judged { gain, share, amplitude: if others.is_empty() { f64::INFINITY } else { amplitude } }
     }
 
     /// Gain of a candidate over the others with the noise that it leaves itself (Cochrane-Orcutt): by its autoregression, or
@@ -205,11 +214,11 @@ impl Search<'_, '_> {
             .collect()
     }
 
-    fn accepts(&self, best: &Scored, share: f64, amplitude: f64) -> bool {
-        let alone = amplitude.is_infinite();
-        best.score >= self.thresholds.nats
-            && best.gain.least >= 0.5 * self.thresholds.nats
-            && (alone || (share >= self.thresholds.share && amplitude >= self.thresholds.amplitude))
+    fn accepts(&self, scored: &Scored, judged: &Judged) -> bool {
+        let alone = judged.amplitude.is_infinite();
+        judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
+            && judged.gain.least >= 0.5 * self.thresholds.nats
+            && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
 
     /// Shapes of all that was chosen, one after the other, beside the rest.
@@ -252,21 +261,21 @@ impl Search<'_, '_> {
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
                 let Some(best) = ranked.first().cloned() else { continue };
                 let swapped = !best.candidate.same_claim(&chosen[k]);
-                let (judged, share, amplitude) = self.judged(&base, &others, best);
-                if !self.accepts(&judged, share, amplitude) {
-                    trace(format!("  dropped {} share {share:.2} amplitude {amplitude:.2}", describe(&judged)));
+                let judged = self.judged(&base, &others, &best);
+                if !self.accepts(&best, &judged) {
+                    trace(format!("  dropped {} {judged:.2?}", describe(&best)));
                     *chosen = others;
                     continue 'again;
                 }
                 if swapped && sweep < 4 {
-                    trace(format!("  swapped for {}", describe(&judged)));
-                    chosen[k] = judged.candidate;
+                    trace(format!("  swapped for {}", describe(&best)));
+                    chosen[k] = best.candidate;
                     self.polish(chosen);
                     continue 'again;
                 }
-                chosen[k] = judged.candidate.clone();
+                chosen[k] = best.candidate.clone();
                 let rivals = ranked.into_iter().skip(1).collect();
-                effects.push(Effect { chosen: judged, rivals, share });
+                effects.push(Effect { chosen: best, rivals, gain: judged.gain, share: judged.share });
             }
             effects.reverse();
             return effects;
@@ -311,8 +320,14 @@ impl Search<'_, '_> {
         }
         sort(&mut claims);
         let mut claims = distinct(&claims);
+        // Rivals are told apart by the rows that count once the best of them is in: what it leaves is its model's error, and
+        // that is not independent from row to row.
         if let Some(best) = claims.first().filter(|best| best.gain.nats > 0.0) {
-            let scale = (self.significance(others, &best.candidate).nats.max(0.0) / best.gain.nats).min(1.0);
+            let with = self.scorer.extended(grams, &best.candidate.columns);
+            let after = self.scorer.fit(&with);
+            self.scorer.temper(&with, &after);
+            let scale = (self.scorer.gain(&base, &after).nats.max(0.0) / best.gain.nats).min(1.0);
+            self.scorer.untempered();
             for scored in &mut claims {
                 scored.gain = Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
                 scored.score = scored.gain.nats - price(&scored.candidate);

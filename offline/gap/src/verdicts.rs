@@ -239,9 +239,9 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let physics = physics(candidate);
     let location = location(found, candidate, estimate, effect.share);
     let fit = fits(found, candidate, &estimate.coefficients);
-    let score = Score { folds: Some(found.problem.block_count as u64), threshold_nats: Some(threshold), n_parameters: Some(estimate.parameters.len() as u64), ..Score::new(effect.chosen.gain.nats, effect.chosen.gain.error) };
+    let score = Score { folds: Some(found.problem.block_count as u64), threshold_nats: Some(threshold), n_parameters: Some(estimate.parameters.len() as u64), ..Score::new(effect.gain.nats, effect.gain.error) };
     let claim = format!("explains {:.0} % of what is left where it shows most", 100.0 * effect.share);
-    let mut evidence = Evidence::new("held-out gain over all other effects", claim, (effect.chosen.gain.nats, "nats"), TestMethod::HeldOutGain);
+    let mut evidence = Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
     evidence.effect = None;
     let mut verdict = Verdict::primary(number, physics.clone(), probability, location.clone(), (told_parameters(found, candidate, estimate), fit, vec![evidence]), artifact);
     verdict.score = Some(score);

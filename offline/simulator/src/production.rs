@@ -6,9 +6,10 @@ use ravenpose_wire::RavenState;
 use recordings::sample::{self, Cycle};
 use recordings::stream::{Record, Truth};
 
-use crate::model::Robot;
+use crate::model::{Robot, RobotError, RobotModel};
 use crate::plant::PlantError;
 use crate::random::Random;
+use crate::resimulate::{self, Commands, ResimulateError};
 use crate::simulation::{Command, CycleOfArm, Simulation};
 use crate::trajectory::{Trajectory, WORKSPACE, teleoperation, zigzag};
 
@@ -89,7 +90,25 @@ impl Run {
 struct Playing {
     arm: Arm,
     simulation: Simulation,
-    trajectory: Trajectory,
+    way: Way,
+}
+
+/// Where an arm is sent.
+enum Way {
+    Made(Trajectory),
+    Recorded(Commands),
+}
+
+impl Way {
+    fn at(&self, time_s: f64) -> Joints {
+        match self {
+            Self::Made(trajectory) => trajectory.at(time_s),
+            Self::Recorded(commands) => {
+                let joints = commands.at(time_s);
+                std::array::from_fn(|i| joints[i])
+            }
+        }
+    }
 }
 
 /// A run being made, cycle by cycle.
@@ -109,6 +128,26 @@ impl Player {
         Ok(Self { run, arms, cycle: 0 })
     }
 
+    /// One arm along the commands of a recording: from the recorded motors and their speeds, or, where it has none, settled at
+    /// the first command.
+    ///
+    /// # Errors
+    /// [`ResimulateError`] without commands, and for effects that cannot be where they are.
+    pub fn following(model: &RobotModel, recorded: &resimulate::Run, run: Run) -> Result<Self, ResimulateError> {
+        let commands = Commands::of_run(model, recorded)?;
+        let Some(robot) = model.as_raven() else {
+            return Err(RobotError::Change("only a RAVEN-II has states".to_owned()).into());
+        };
+        let first: Joints = std::array::from_fn(|i| commands.first()[i]);
+        let mut simulation = Simulation::new(robot, model.side(), run.seed, &first)?;
+        match recorded.start_of_raven(model, &commands) {
+            Some((motors, speeds)) => simulation.start_at(&motors, &speeds),
+            None => simulation.settle(&first, SETTLE_S),
+        }
+        let arm = robot.raven.arm(model.side());
+        Ok(Self { run, arms: vec![Playing { arm, simulation, way: Way::Recorded(commands) }], cycle: 0 })
+    }
+
     /// The next cycle: the state, and where each arm truly is, in the order of the plan's arms; none at the end of the run.
     pub fn next_cycle(&mut self) -> Option<(RavenState, Vec<(Side, CycleOfArm)>)> {
         if self.cycle == self.run.cycles() {
@@ -123,7 +162,7 @@ impl Player {
             .arms
             .iter_mut()
             .map(|playing| {
-                let cycle = playing.simulation.tick(&Command::Joints(playing.trajectory.at(time_s)));
+                let cycle = playing.simulation.tick(&Command::Joints(playing.way.at(time_s)));
                 sample::put(&mut state, &playing.arm, &cycle.reported);
                 (playing.arm.side, cycle)
             })
@@ -167,7 +206,7 @@ fn playing(robot: &Robot, side: Side, run: Run) -> Result<Playing, PlantError> {
     let trajectory = make(seed, start, &WORKSPACE, run.duration_s);
     let mut simulation = Simulation::new(robot, side, seed, &start)?;
     simulation.settle(&start, SETTLE_S);
-    Ok(Playing { arm, simulation, trajectory })
+    Ok(Playing { arm, simulation, way: Way::Made(trajectory) })
 }
 
 fn truth(time_ns: i64, side: Side, cycle: &CycleOfArm) -> Truth {

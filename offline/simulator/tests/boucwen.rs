@@ -66,7 +66,9 @@ fn the_true_parameters_give_the_benchmarks_displacement() {
     let Some((with, size)) = rms(&hysteretic(), Hold::Smooth) else { return };
     let (without, _) = rms(&RobotModel::from_toml(ROBOT, None).expect("robot"), Hold::Smooth).expect("data");
     let (line, _) = rms(&hysteretic(), Hold::Line).expect("data");
-    println!("displacement {size:.3e} m RMS; off by {with:.2e} m with the hysteresis, {without:.2e} without; force in lines {line:.2e}");
+    println!(
+        "displacement {size:.3e} m RMS; off by {with:.2e} m with the hysteresis, {without:.2e} without; force in lines {line:.2e}"
+    );
     assert!(with <= 5e-5, "{with}");
     assert!(without > 10.0 * with, "{without}");
 }

@@ -2,9 +2,12 @@
 //! else; names and parameters are those of `models/gap-vocabulary.json`.
 #![allow(missing_docs)]
 
+mod common;
+
 use arm::{JOINTS, Joints, Side};
+use common::cases::{Case, Places, physics};
 use simulator::model::{Bound, Effect};
-use simulator::physics::{Channel, Parameters, Physics, Value, names, parameters_of};
+use simulator::physics::{Channel, names, parameters_of};
 use simulator::plant::Method;
 use simulator::trajectory::{WORKSPACE, teleoperation};
 use simulator::{Command, CycleOfArm, Robot, Simulation};
@@ -23,57 +26,21 @@ fn run(effects: &[Effect]) -> Vec<CycleOfArm> {
     (0..3000).map(|k| simulation.tick(&Command::Joints(trajectory.at(f64::from(k) * 1e-3)))).collect()
 }
 
-fn physics(name: &str, numbers: &[(&str, f64)]) -> Physics {
-    Physics::new(name, &Parameters::of(numbers)).expect("a name of the vocabulary").expect("parameters")
-}
-
-/// Name, parameters of an effect that is not there, parameters of one that is, and where.
-fn cases() -> Vec<(Physics, Physics, Vec<Bound>)> {
-    let joints = |last: usize| (0..last).map(Bound::Joint).collect::<Vec<_>>();
-    let case = |name: &str, none: &[(&str, f64)], some: &[(&str, f64)], bounds: Vec<Bound>| {
-        (physics(name, none), physics(name, some), bounds)
-    };
-    let vector = |values: Vec<f64>| {
-        let parameters = Parameters([("dpi_B".to_owned(), Value::Vector(values))].into());
-        Physics::new("link_inertia", &parameters).expect("name").expect("parameters")
-    };
-    let contact = |k: f64, x_0: f64| {
-        let mut parameters = Parameters::of(&[("k", k), ("x_0", x_0)]);
-        parameters.0.insert("n".to_owned(), Value::Vector(vec![1.0, 0.0, 0.0]));
-        Physics::new("external_contact", &parameters).expect("name").expect("parameters")
-    };
-    vec![
-        case("coulomb_friction", &[("f_c", 0.0)], &[("f_c", 0.8)], joints(7)),
-        case("viscous_friction", &[("b", 0.0)], &[("b", 2.0)], joints(7)),
-        case(
-            "stribeck_friction",
-            &[("f_c", 0.0), ("f_s", 0.0), ("v_s", 0.01)],
-            &[("f_c", 0.5), ("f_s", 1.0), ("v_s", 0.01)],
-            joints(7),
-        ),
-        case("load_dependent_friction", &[("mu_l", 0.0)], &[("mu_l", 0.3)], joints(3)),
-        case("backlash", &[("b", 0.0)], &[("b", 0.003)], joints(7)),
-        case("cable_stretch", &[("k", 1e15)], &[("k", 800.0)], joints(3)),
-        case("cable_creep", &[("J_k", 0.0), ("T_k", 1.0)], &[("J_k", 1e-3), ("T_k", 1.0)], joints(3)),
-        case("joint_coupling", &[("c_ij", 0.0)], &[("c_ij", 0.02)], vec![Bound::Pair(1, 0), Bound::Pair(2, 1), Bound::Pair(5, 4)]),
-        case("payload", &[("m_p", 0.0)], &[("m_p", 0.2)], vec![Bound::Robot]),
-        case("gravity_direction", &[], &[("b", 0.1)], vec![Bound::Robot]),
-        (
-            vector(vec![0.0; 10]),
-            vector(vec![0.1, 0.0, 0.02, 0.0, 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3]),
-            (0..3).map(Bound::Link).collect(),
-        ),
-        case("motor_torque_scale", &[], &[("kappa", 0.8), ("d_0", 30.0)], joints(7)),
-        case("torque_ripple", &[("amp", 0.0), ("order", 6.0)], &[("amp", 0.5), ("order", 6.0)], joints(7)),
-        case("joint_offset", &[("o", 0.0)], &[("o", 0.005)], joints(7)),
-        case("transmission_ratio", &[("e", 0.0)], &[("e", 0.02)], joints(7)),
-        case("pulley_eccentricity", &[("e_over_r", 0.0), ("period", 0.5)], &[("e_over_r", 0.002), ("period", 0.5)], joints(7)),
-        case("link_geometry", &[], &[("d_alpha", 0.01), ("d_length", 0.003)], (0..6).map(Bound::Link).collect()),
-        case("measurement_delay", &[], &[("d", 0.02)], Channel::NAMES.map(|(_, channel)| Bound::Channel(channel)).to_vec()),
-        case("frame_misalignment", &[], &[("w_z", 0.02), ("t_x", 0.004)], vec![Bound::Robot]),
-        (contact(1000.0, 10.0), contact(1000.0, -0.2), vec![Bound::Robot]),
-        case("thermal_drift", &[("kappa_T", 0.0), ("T", 1.0)], &[("kappa_T", 0.5), ("T", 1.0)], joints(7)),
-    ]
+/// Every physics on every place that a RAVEN-II has for it.
+fn cases() -> Vec<Case> {
+    let plant = Robot::nominal().raven.plant().clone();
+    let stiffness = (0..3).map(|i| 2.0 * plant.cable.ke_n[i] * plant.cable.joint_radius_m[i].powi(2)).collect();
+    let pairs = vec![Bound::Pair(1, 0), Bound::Pair(2, 1), Bound::Pair(5, 4)];
+    common::cases::all(&Places {
+        joints: 7,
+        stiffness,
+        pairs,
+        heavy_links: 3,
+        links: 6,
+        ripple: 0.5,
+        coulomb: 0.8,
+        contact_x_m: -0.2,
+    })
 }
 
 /// Largest differences of two runs: true joints, reported joints, torque, tip.
@@ -119,8 +86,8 @@ fn names_and_parameters_are_those_of_the_vocabulary() {
 #[test]
 fn an_effect_of_size_zero_changes_nothing_and_one_of_size_shows() {
     let nominal = run(&[]);
-    let mut seen = std::collections::BTreeSet::from(["cable_hysteresis"]);
-    for (none, some, bounds) in cases() {
+    let mut seen = std::collections::BTreeSet::new();
+    for Case { none, some, bounds } in cases() {
         seen.insert(none.name());
         for bound in bounds {
             let absent = difference(&run(&[Effect::new(none, bound)]), &nominal);

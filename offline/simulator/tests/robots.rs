@@ -280,6 +280,19 @@ fn joints_that_move_nothing_and_effects_without_a_place_are_refused_when_a_plant
 }
 
 #[test]
+fn the_example_of_the_documentation_is_a_robot() {
+    let text = include_str!("../../../docs/simulator.md");
+    let section = text.split("## Any other arm").nth(1).expect("section");
+    let block = section.lines().skip_while(|line| !line.starts_with("    ")).take_while(|line| line.starts_with("    "));
+    let lines: Vec<String> = block
+        .map(|line| if line.contains("urdf = ") { format!("urdf_xml = '''\n{THREE_JOINTS}'''") } else { line.to_owned() })
+        .collect();
+    let robot = RobotModel::from_toml(&lines.join("\n"), None).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(robot.drives()[0].stiffness, 1600.0);
+    robot.plant().expect("a plant");
+}
+
+#[test]
 fn the_arm_of_the_gap_examples_loads() {
     let Some(path) = gap_urdf() else { return };
     let robot = RobotModel::load(&path.to_string_lossy()).expect("URDF");

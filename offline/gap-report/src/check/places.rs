@@ -31,13 +31,16 @@ pub(super) fn check(report: &Report, findings: &mut Findings) {
         let distinct: HashSet<&String> = verdict.location.joint.iter().collect();
         findings.demand(distinct.len() == verdict.location.joint.len(), || format!("{place}: names a joint twice"));
         for stretch in &verdict.location.time_intervals {
-            findings.demand(runs.contains(stretch.run.as_str()), || format!("{place}: there is no run `{}` in inputs.runs", stretch.run));
+            findings.demand(runs.contains(stretch.run.as_str()), || {
+                format!("{place}: there is no run `{}` in inputs.runs", stretch.run)
+            });
             ordered(stretch, &place, findings);
         }
         for fit in &verdict.fit {
             held_out_only(report, fit, &place, findings);
         }
-        let experiments = verdict.suggested_experiment.iter().filter_map(|experiment| experiment.trajectory.as_ref()?.file.as_ref());
+        let experiments =
+            verdict.suggested_experiment.iter().filter_map(|experiment| experiment.trajectory.as_ref()?.file.as_ref());
         for file in experiments {
             relative(file, &place, findings);
         }
@@ -96,7 +99,9 @@ fn held_out_only(report: &Report, fit: &Fit, place: &str, findings: &mut Finding
         let role = report.inputs.runs.iter().find(|run| run.id == *id).map(|run| run.role);
         match role {
             Some(RunRole::HeldOut | RunRole::Split) => {}
-            Some(role) => findings.0.push(format!("{place}: run `{id}` has the role {role}; fits are judged on held_out or split runs only")),
+            Some(role) => {
+                findings.0.push(format!("{place}: run `{id}` has the role {role}; fits are judged on held_out or split runs only"))
+            }
             None => findings.0.push(format!("{place}: there is no run `{id}` in inputs.runs")),
         }
     }

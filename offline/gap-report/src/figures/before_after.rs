@@ -4,7 +4,7 @@ use plot::figure::{Axis, Colour, Figure, Mark, Panel, decimate};
 
 use super::{AFTER, BEFORE, scale_of, title};
 use crate::BeforeAfter;
-use crate::text::{short, with_unit};
+use crate::text::with_unit;
 
 /// Length of the stretch that is enlarged, s.
 const CLOSE_UP_S: f64 = 5.0;
@@ -17,7 +17,7 @@ pub(crate) fn before_after(picture: &BeforeAfter, width_px: f64) -> Vec<Figure> 
     let mut figures = vec![over(picture, whole, width_px, 150.0, &heading).caption(caption(picture))];
     if last - first > 3.0 * CLOSE_UP_S {
         let from = worst_start(picture, CLOSE_UP_S);
-        let heading = format!("The same, {} s enlarged", short(CLOSE_UP_S));
+        let heading = format!("The worst {CLOSE_UP_S:.0} s of it");
         figures.push(over(picture, (from, from + CLOSE_UP_S), width_px, 130.0, &heading));
     }
     figures
@@ -27,24 +27,27 @@ fn over(picture: &BeforeAfter, span: (f64, f64), width_px: f64, height_px: f64, 
     let scale = scale_of(&picture.error, picture.before.iter().chain(&picture.after).copied());
     let x = Axis::new("Time, s").range(span.0, span.1);
     let mut panel = Panel::new(Axis::new(title("Error", &scale))).height(height_px);
-    if let Some(floor) = picture.noise_floor.filter(|floor| floor.is_finite()) {
-        let half = 2.0 * floor * scale.per_unit;
+    let floor = picture.noise_floor.filter(|floor| floor.is_finite()).map(|floor| 2.0 * floor * scale.per_unit);
+    if let Some(half) = floor {
         panel = panel.mark(Mark::Band { colour: Colour::GREY, points: vec![(span.0, -half, half), (span.1, -half, half)] });
     }
     let figure = Figure::new(heading, x).width(width_px);
     let columns = figure.columns_px();
     let line = |name: &str, colour, values: &[f64]| {
         let samples = picture.t_s.iter().copied().zip(values.iter().map(|value| value * scale.per_unit));
-        Mark::strokes(name, colour, decimate::min_max(samples, span, columns, 0.1 * (span.1 - span.0)))
+        Mark::strokes(name, colour, decimate::min_max(samples, span, columns, 0.1 * (span.1 - span.0))).style("thin")
     };
     let lines = [line("before", BEFORE, &picture.before), line("after", AFTER, &picture.after)];
-    figure.panel(panel.mark(Mark::Rule { y: 0.0 }).marks(lines))
+    // The edges of the band lie on top: a long run hides the band itself.
+    let edge = |height: f64| Mark::line("", Colour::INK, vec![(span.0, height), (span.1, height)]).style("thin dashed");
+    let edges = floor.into_iter().flat_map(|half| [edge(-half), edge(half)]);
+    figure.panel(panel.mark(Mark::Rule { y: 0.0 }).marks(lines).marks(edges))
 }
 
 fn caption(picture: &BeforeAfter) -> String {
     let floor = picture.noise_floor.filter(|floor| floor.is_finite());
     let band = floor.map_or_else(String::new, |floor| {
-        format!(" Grey: noise alone ({} RMS) stays inside 95 % of the time.", with_unit(floor, &picture.error.unit))
+        format!(" Noise alone ({} RMS) stays between the dashed lines 95 % of the time.", with_unit(floor, &picture.error.unit))
     });
     format!("{} was not used for fitting.{band}", picture.run)
 }

@@ -7,11 +7,11 @@ mod spectrum;
 
 use plot::figure::Colour;
 
-use crate::Quantity;
 use crate::text::{Scale, scale};
+use crate::{Channel, Quantity};
 
 pub(crate) use before_after::before_after;
-pub(crate) use heat::{channel_title, heat_map, hottest};
+pub(crate) use heat::{grouped, heat_maps, hottest};
 pub(crate) use signature::signature;
 pub(crate) use spectrum::spectrum;
 
@@ -24,6 +24,18 @@ const AFTER: Colour = Colour::BLUE;
 fn scale_of(quantity: &Quantity, values: impl IntoIterator<Item = f64>) -> Scale {
     let greatest = values.into_iter().filter(|value| value.is_finite()).fold(0.0, |most: f64, value| most.max(value.abs()));
     scale(greatest, &quantity.unit)
+}
+
+/// A channel as a title.
+pub(crate) fn channel_title(channel: Channel) -> &'static str {
+    match channel {
+        Channel::JointTorque => "Joint torque",
+        Channel::Transmission => "Transmission",
+        Channel::EndEffector => "Tool position",
+        Channel::Timing => "Timing",
+        Channel::ClosedLoopOutput => "Whole loop",
+        Channel::Command => "Commands",
+    }
 }
 
 /// `Velocity, mm/s`.

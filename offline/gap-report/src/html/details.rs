@@ -1,16 +1,17 @@
 //! What is folded: runs, method, where everything came from.
 
-use super::quality;
+use super::effect::alternatives;
 use super::tags::{around, folded, list, table, text};
 use crate::text::{as_given, capital, count, duration, percent, short, significance};
-use crate::{Evidence, Level, Report, Run, RunRole, Verdict};
+use crate::{Evidence, Level, Report, Run, RunRole, Verdict, quality_headline};
 
 /// All of it.
 pub(super) fn details(report: &Report) -> String {
-    let checks: Vec<String> = report.quality(Level::Ok).map(quality::line).collect();
+    let checks: Vec<String> = report.quality(Level::Ok).map(quality_headline).collect();
     let parts = [
         folded("Runs", &runs(report)),
         folded("Checks of the data that were passed", &list("ul", checks)),
+        folded("Alternatives in numbers", &alternatives(report)),
         folded("Method and evidence", &method(report)),
         folded("Where this comes from", &provenance(report)),
     ];
@@ -24,7 +25,10 @@ fn runs(report: &Report) -> String {
             (None, Some(all)) => count(all),
             _ => String::new(),
         };
-        let part = run.held_out_interval.as_ref().map_or_else(String::new, |part| format!(" {:.1}\u{2013}{:.1} s", part.start_s, part.end_s));
+        let part = run
+            .held_out_interval
+            .as_ref()
+            .map_or_else(String::new, |part| format!(" {:.1}\u{2013}{:.1} s", part.start_s, part.end_s));
         vec![
             run.id.clone(),
             format!("{}{part}", plain_role(run.role)),
@@ -78,9 +82,10 @@ fn evidence_of(verdict: &Verdict) -> String {
             effect,
         ]
     };
-    let score = verdict.score.as_ref().map_or_else(String::new, |score| {
-        format!(" Gain {} \u{b1} {} nats.", short(score.gain_nats), short(score.gain_se))
-    });
+    let score = verdict
+        .score
+        .as_ref()
+        .map_or_else(String::new, |score| format!(" Gain {} \u{b1} {} nats.", short(score.gain_nats), short(score.gain_se)));
     let heading = format!("{}.{score}", capital(verdict.physics.plain()));
     let header = ["What it shows", "Test", "Statistic", "p", "Effect"];
     text("h3", "", &heading) + &around("div", "wrap", &table(2, &header, verdict.evidence.iter().map(row).collect()))
@@ -113,7 +118,10 @@ fn provenance(report: &Report) -> String {
         ("Vocabulary".to_owned(), tool.vocabulary_version.clone()),
         ("Seed".to_owned(), tool.seed.to_string()),
         ("Access to the simulator".to_owned(), inputs.simulator.access.name().replace('_', " ")),
-        ("Channels".to_owned(), inputs.channels.iter().map(|channel| channel.name().replace('_', " ")).collect::<Vec<_>>().join(", ")),
+        (
+            "Channels".to_owned(),
+            inputs.channels.iter().map(|channel| channel.name().replace('_', " ")).collect::<Vec<_>>().join(", "),
+        ),
         ("Configuration, SHA-256".to_owned(), tool.config_sha256.clone()),
     ];
     facts.extend(inputs.robot.urdf_sha256.clone().map(|hash| ("URDF, SHA-256".to_owned(), hash)));
@@ -139,9 +147,10 @@ fn list_of<'a>(facts: impl Iterator<Item = (&'a str, &'a str)>) -> String {
 }
 
 fn footer(report: &Report) -> String {
-    let model = report.corrected_model.as_ref().map_or_else(String::new, |model| {
-        format!(" The corrected model is {}: give it to --robot.", model.path)
-    });
+    let model = report
+        .corrected_model
+        .as_ref()
+        .map_or_else(String::new, |model| format!(" The corrected model is {}: give it to --robot.", model.path));
     let said = format!("{} {}.{model} Research software, no clinical use.", report.tool.name, report.tool.version);
     around("footer", "", &text("p", "fine", &said))
 }

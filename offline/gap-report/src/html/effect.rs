@@ -1,10 +1,10 @@
 //! One section per effect: how it shows, what its correction gains, its parameters, what it may be confused with.
 
 use super::fits::fit;
-use super::tags::{HALF_PX, around, figure, folded, list, section, table, text};
-use crate::figures::{before_after, signature, spectrum};
+use super::tags::{HALF_PX, around, figure, list, section, table, text};
+use crate::figures::{before_after, channel_title, signature, spectrum};
 use crate::text::{Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, short};
-use crate::{Confusable, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
+use crate::{Confusable, Evidence, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
 
 /// All effects.
 pub(super) fn effects(report: &Report, pictures: &Pictures) -> String {
@@ -17,7 +17,8 @@ pub(super) fn effects(report: &Report, pictures: &Pictures) -> String {
 }
 
 fn effect(report: &Report, verdict: &Verdict, pictures: &Pictures, several: bool) -> String {
-    let at = if verdict.location.joint.is_empty() { String::new() } else { format!(", {}", joints(&verdict.location.joint)) };
+    let at = joints(&verdict.location.joint);
+    let at = if verdict.location.joint.is_empty() { String::new() } else { format!(", {}", at.trim_start_matches("the ")) };
     let number = if several { format!("{}. ", verdict.effect) } else { String::new() };
     let heading = format!("{number}{}{at}", capital(verdict.physics.plain()));
     let mut out = place(verdict);
@@ -29,10 +30,13 @@ fn effect(report: &Report, verdict: &Verdict, pictures: &Pictures, several: bool
     let spectra: String = spectra.map(|picture| figure(|width| spectrum(picture, width), HALF_PX)).collect();
     out += &columns(&[shows, held_out, spectra]);
     let fits: String = verdict.fit.iter().map(fit).collect();
-    let fits = if fits.is_empty() { fits } else { text("h3", "", "On runs that were not fitted") + &fits };
+    let fits = if fits.is_empty() { fits } else { text("h3", "", &judged_on(verdict)) + &fits };
     let parameters = parameters(&verdict.physics, &verdict.parameters);
     let parameters = if parameters.is_empty() { parameters } else { text("h3", "", "How much") + &parameters };
     out += &columns(&[fits, parameters]);
+    if !verdict.physics.is_named() {
+        out += &list("ul", verdict.evidence.iter().map(claim));
+    }
     out += &doubts(report, verdict);
     section(&heading, &out)
 }
@@ -41,6 +45,20 @@ fn run_before_after(picture: &crate::BeforeAfter) -> String {
     // Both widths hold as many figures.
     let count = before_after(picture, HALF_PX).len();
     (0..count).map(|i| figure(|width| before_after(picture, width).swap_remove(i), HALF_PX)).collect()
+}
+
+/// What a test shows, with its figure: all there is to say on what has no name.
+fn claim(test: &Evidence) -> String {
+    format!("{} ({}: {} {}).", capital(&test.claim), test.test, short(test.statistic), test.statistic_name)
+}
+
+/// `On held-out data (run-04, run-05)`.
+fn judged_on(verdict: &Verdict) -> String {
+    let mut runs: Vec<&str> = verdict.fit.iter().flat_map(|fit| &fit.on).map(String::as_str).collect();
+    runs.sort_unstable();
+    runs.dedup();
+    let part = if runs.len() > 6 { format!("{} runs", runs.len()) } else { runs.join(", ") };
+    format!("On held-out data ({part})")
 }
 
 /// Side by side where there is room; one alone keeps its half.
@@ -54,14 +72,15 @@ fn place(verdict: &Verdict) -> String {
     let location = &verdict.location;
     let mut said: Vec<String> = Vec::new();
     if let Some(share) = location.energy_share {
-        said.push(format!("{} of the error above noise of this channel is here.", percent(share)));
+        let channel = channel_title(location.channel).to_lowercase();
+        said.push(format!("{} of the error above noise in {channel} is here.", percent(share)));
     }
     for regime in &location.regime {
         let share = regime.energy_share.map_or_else(String::new, |share| format!(" ({} of it)", percent(share)));
         said.push(format!("{}{share}.", capital(&regime.condition)));
     }
     for stretch in &location.time_intervals {
-        said.push(format!("{}, from {:.1} to {:.1} s.", capital(&stretch.run), stretch.start_s, stretch.end_s));
+        said.push(format!("In {}, from {:.1} to {:.1}\u{a0}s.", stretch.run, stretch.start_s, stretch.end_s));
     }
     text("p", "", &said.join(" "))
 }
@@ -80,7 +99,14 @@ fn parameters(physics: &Physics, parameters: &[Parameter]) -> String {
         }
         vec![parameter_name(physics, &parameter.name), estimate.plain(), estimate.interval(), known]
     };
-    table(1, &["Parameter", "Value", "95 % interval", "Determined"], parameters.iter().map(row).collect())
+    let mut rows: Vec<Vec<String>> = parameters.iter().map(row).collect();
+    let mut header = vec!["", "Value", "95 % interval", "Determined"];
+    // Nothing to say where all is well.
+    if rows.iter().all(|row| row[3] == "yes") {
+        rows.iter_mut().for_each(|row| row.truncate(3));
+        header.truncate(3);
+    }
+    table(1, &header, rows)
 }
 
 /// What it may be instead, and what would decide.
@@ -141,19 +167,22 @@ pub(super) fn left_over(report: &Report, pictures: &Pictures) -> String {
         out += &text("p", "", &format!("{} of what can be explained at all is explained.", percent(share)));
     }
     if let Some(depends) = remaining.depends_on.as_deref().filter(|depends| !depends.is_empty()) {
-        out += &text("p", "", &format!("What is left goes with {}.", listed(depends, "and")));
+        let depends: Vec<String> = depends.iter().map(|name| name.replace('_', " ")).collect();
+        out += &text("p", "", &format!("What is left goes with {}.", listed(&depends, "and")));
     }
     let together: String = pictures.before_after.iter().filter(|picture| picture.effect.is_none()).map(run_before_after).collect();
     let spectra = pictures.spectra.iter().filter(|picture| picture.effect.is_none());
     let spectra: String = spectra.map(|picture| figure(|width| spectrum(picture, width), HALF_PX)).collect();
     out += &columns(&[together, spectra]);
     out += &remaining.fit.iter().flatten().map(fit).collect::<String>();
-    let alternatives: String = report.verdicts.iter().filter(|verdict| !verdict.is_primary()).map(alternative).collect();
-    out += &folded("Alternatives in numbers", &alternatives);
     section("All corrections together", &out)
 }
 
-fn alternative(verdict: &Verdict) -> String {
-    let heading = format!("{}: {}", capital(verdict.physics.plain()), probability(verdict.probability));
-    text("h3", "", &heading) + &parameters(&verdict.physics, &verdict.parameters)
+/// What competes with the verdicts, in numbers.
+pub(super) fn alternatives(report: &Report) -> String {
+    let one = |verdict: &Verdict| {
+        let heading = format!("{}: {}", capital(verdict.physics.plain()), probability(verdict.probability));
+        text("h3", "", &heading) + &parameters(&verdict.physics, &verdict.parameters)
+    };
+    report.verdicts.iter().filter(|verdict| !verdict.is_primary()).map(one).collect()
 }

@@ -1,20 +1,20 @@
 //! What a correction gains on held-out runs, as bars.
 
 use super::tags::{around, text};
-use crate::text::{as_given, percent, plain_metric};
+use crate::text::{as_given, capital, percent, plain_metric};
 use crate::{Fit, Metric, Space};
 
 /// One figure before, after and by noise alone.
 pub(super) fn fit(fit: &Fit) -> String {
-    let name = format!("{}, {} {}", crate::text::capital(&fit.quantity), plain_metric(fit.metric), plain_space(fit.space));
-    let mut out = text("p", "name", &name);
+    let how = format!("{}, {}", plain_metric(fit.metric), plain_space(fit.space));
+    let mut out = text("p", "name", &capital(&fit.quantity)) + &text("p", "how", &how);
     let least_is_best = !matches!(fit.metric, Metric::R2 | Metric::LogLikelihoodPerSample);
     let most = [fit.before, fit.after].into_iter().chain(fit.noise_floor).fold(0.0_f64, f64::max);
     let bar = |name: &str, class: &str, value: f64| {
         let width = if most > 0.0 { (100.0 * value / most).clamp(0.0, 100.0) } else { 0.0 };
         format!(
             "{}<span class=\"t\" aria-hidden=\"true\"><i class=\"{class}\" style=\"width:{width:.1}%\"></i></span>{}",
-            text("span", "", name),
+            text("span", "l", name),
             text("span", "n", &as_given(value, &fit.unit))
         )
     };
@@ -27,7 +27,6 @@ pub(super) fn fit(fit: &Fit) -> String {
         });
         out += &text("p", "gone", &format!("{} of the removable error is gone{interval}.", percent(gone)));
     }
-    out += &text("p", "fine", &format!("Judged on {}.", fit.on.join(", ")));
     around("div", "fit", &out)
 }
 
@@ -35,7 +34,7 @@ pub(super) fn fit(fit: &Fit) -> String {
 pub(super) fn plain_space(space: Space) -> &'static str {
     match space {
         Space::EquationError => "on the recorded motion",
-        Space::ClosedLoop => "with the simulation run again",
-        Space::RecordedOutput => "of the recorded simulation, corrected",
+        Space::ClosedLoop => "simulation run again",
+        Space::RecordedOutput => "recorded simulation, corrected",
     }
 }

@@ -1,8 +1,8 @@
 //! The top: what was compared, the answer in words, the figures that matter.
 
 use super::tags::{around, text};
-use crate::text::{as_given, joined, percent, probability, short, written};
-use crate::{Fit, Level, Report, Status, headlines};
+use crate::text::{as_given, capital, duration, headlines_unbroken, joined, percent, probability, short, written};
+use crate::{Fit, Level, Physics, Report, RunRole, Status};
 
 /// What was compared, the answer's mark and its sentences.
 pub(super) fn head(report: &Report) -> String {
@@ -14,9 +14,11 @@ pub(super) fn head(report: &Report) -> String {
     let mut out = text("p", "kicker", &format!("Gap report \u{b7} {} against {simulator} \u{b7} {date}", report.inputs.robot.name));
     let (class, mark) = chip(report);
     out += &text("p", &format!("chip {class}"), &mark);
-    let mut sentences = headlines(report).into_iter();
+    let mut sentences = headlines_unbroken(report).into_iter();
     out += &text("h1", "", &sentences.next().unwrap_or_default());
-    for sentence in sentences {
+    // Without a verdict the box with the failures follows and says why.
+    let said_below = report.status == Status::InsufficientData && report.quality(Level::Fail).next().is_some();
+    for sentence in sentences.filter(|_| !said_below) {
         out += &text("p", "lead", &sentence);
     }
     if report.told().any(|verdict| !verdict.parameters.is_empty()) {
@@ -38,32 +40,64 @@ fn chip(report: &Report) -> (&'static str, String) {
 
 /// The figures that matter, on tiles.
 pub(super) fn tiles(report: &Report) -> String {
-    let mut tiles: Vec<(String, String)> = Vec::new();
+    if report.status == Status::InsufficientData {
+        return String::new();
+    }
+    let mut tiles: Vec<Tile> = Vec::new();
     let first = report.told().next();
     let together = report.remaining.fit.iter().flatten().next();
     if let Some(fit) = together.or_else(|| first.and_then(|verdict| verdict.fit.first())) {
         if let Some(gone) = fit.removed_fraction {
-            tiles.push(("of the removable error gone".to_owned(), percent(gone)));
+            tiles.push(Tile::new("Removable error gone", percent(gone), "on held-out runs"));
         }
-        tiles.push((format!("{}, held-out runs", fit.quantity), change(fit)));
-        if let Some(floor) = fit.noise_floor {
-            tiles.push(("noise alone".to_owned(), as_given(floor, &fit.unit)));
-        }
+        let floor = fit.noise_floor.map_or_else(String::new, |floor| format!("noise alone {}", as_given(floor, &fit.unit)));
+        tiles.push(Tile::new(&capital(&fit.quantity), change(fit), &floor));
     } else if let Some(worst) = report.mismatch.excess_rms.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
-        let place = worst.joint.as_deref().unwrap_or("largest");
-        tiles.push((format!("difference, {place}"), as_given(worst.value, &worst.unit)));
-        tiles.push(("noise alone".to_owned(), as_given(worst.noise_floor, &worst.unit)));
+        let name = format!("Largest error{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
+        let floor = format!("noise alone {}", as_given(worst.noise_floor, &worst.unit));
+        tiles.push(Tile::new(&name, as_given(worst.value, &worst.unit), &floor));
+    }
+    let resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);
+    if let Some(effect) = resolution.filter_map(|test| test.effect.as_ref()).next() {
+        tiles.push(Tile::new("Visible from", as_given(effect.value, &effect.unit), "less would not show"));
     }
     if let Some(verdict) = first {
-        tiles.push(("sure of the first cause".to_owned(), probability(verdict.probability)));
+        let set = verdict.set_probability.filter(|set| *set > verdict.probability);
+        let set = set.map_or_else(String::new, |set| format!("{} with its look-alikes", probability(set)));
+        tiles.push(Tile::new("Confidence", probability(verdict.probability), &set));
     }
-    let failures = report.quality(Level::Fail).count();
-    if failures > 0 {
-        tiles.push(("checks of the data failed".to_owned(), failures.to_string()));
+    tiles.push(Tile::new("Held out", held_out(report), "not used for fitting"));
+    around("dl", "tiles", &tiles.iter().map(Tile::html).collect::<String>())
+}
+
+/// `2 of 5 runs`, or of a split run `9.6 s of 30 s`.
+fn held_out(report: &Report) -> String {
+    let runs = &report.inputs.runs;
+    if runs.iter().any(|run| run.role == RunRole::HeldOut) {
+        return format!("{} of {} runs", report.held_out().count(), runs.len());
     }
-    tiles.push(("runs held out of all".to_owned(), format!("{} of {}", report.held_out().count(), report.inputs.runs.len())));
-    let tile = |(name, value): &(String, String)| around("div", "", &(text("dt", "", name) + &text("dd", "", value)));
-    around("dl", "tiles", &tiles.iter().map(tile).collect::<String>())
+    let stretches = runs.iter().filter_map(|run| run.held_out_interval.as_ref());
+    let held_out: f64 = stretches.map(|stretch| stretch.end_s - stretch.start_s).sum();
+    let all: f64 = runs.iter().map(|run| run.duration_s).sum();
+    if held_out > 0.0 { format!("{} of {}", duration(held_out), duration(all)) } else { "nothing".to_owned() }
+}
+
+/// A name, a figure, and what to compare it with.
+struct Tile {
+    name: String,
+    value: String,
+    beside: String,
+}
+
+impl Tile {
+    fn new(name: &str, value: String, beside: &str) -> Self {
+        Self { name: name.to_owned(), value, beside: beside.to_owned() }
+    }
+
+    fn html(&self) -> String {
+        let beside = if self.beside.is_empty() { String::new() } else { text("dd", "beside", &self.beside) };
+        around("div", "", &(text("dt", "", &self.name) + &text("dd", "", &self.value) + &beside))
+    }
 }
 
 fn ratio(excess: &crate::ExcessRms) -> f64 {

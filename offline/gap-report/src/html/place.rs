@@ -3,8 +3,8 @@
 use plot::figure::ratio_legend;
 
 use super::tags::{WIDE_PX, figure, section, table, text};
-use crate::figures::{channel_title, heat_map, hottest};
-use crate::text::{as_given, capital, joints, percent, short};
+use crate::figures::{channel_title, grouped, heat_maps, hottest};
+use crate::text::{as_given, joints, percent, short};
 use crate::{Pictures, Report, Share};
 
 /// Bars at most.
@@ -15,11 +15,10 @@ pub(super) fn place(report: &Report, pictures: &Pictures) -> String {
     let mut out = String::new();
     let maps: Vec<_> = pictures.heat.iter().filter(|map| !map.runs.is_empty() && !map.rows.is_empty()).collect();
     if !maps.is_empty() {
-        let most = hottest(&pictures.heat);
-        out += &text("p", "", "The darker, or on a dark page the lighter, the further the simulation is from the recording.");
+        let most = hottest(&maps);
         out += &ratio_legend(most);
-        for map in maps {
-            out += &figure(|width| heat_map(map, most, width), WIDE_PX);
+        for group in grouped(&maps) {
+            out += &figure(|width| heat_maps(&group, most, width), WIDE_PX);
         }
         let held_out: Vec<&str> = report.held_out().collect();
         if !held_out.is_empty() {
@@ -28,7 +27,7 @@ pub(super) fn place(report: &Report, pictures: &Pictures) -> String {
     }
     out += &shares(report, pictures);
     out += &sizes(report);
-    section("Where it is", &out)
+    section(if report.mismatch.detected { "Where it is" } else { "What was compared" }, &out)
 }
 
 /// Bars of the excess energy: those of the engine, otherwise those in the verdicts.
@@ -45,7 +44,7 @@ fn shares(report: &Report, pictures: &Pictures) -> String {
         let width = 100.0 * share.share.clamp(0.0, 1.0);
         format!(
             "{}<span class=\"t\" aria-hidden=\"true\"><i style=\"width:{width:.1}%\"></i></span>{}",
-            text("span", "", &name),
+            text("span", "l", &name),
             text("span", "n", &percent(share.share))
         )
     };
@@ -60,7 +59,7 @@ fn from_verdicts(report: &Report) -> Vec<Share> {
     let share = |verdict: &crate::Verdict| {
         let location = &verdict.location;
         let (channel, share) = (location.channel, location.energy_share?);
-        let joint = format!("{}, {}", channel_title(channel), joints(&location.joint));
+        let joint = format!("{}, {}", channel_title(channel), joints(&location.joint).trim_start_matches("the "));
         Some(Share { channel, joint, regime: String::new(), share })
     };
     report.told().filter_map(share).collect()
@@ -69,15 +68,14 @@ fn from_verdicts(report: &Report) -> Vec<Share> {
 /// RMS of the residuals beside noise.
 fn sizes(report: &Report) -> String {
     let row = |excess: &crate::ExcessRms| {
-        let place = excess.joint.as_deref().map_or_else(|| "all".to_owned(), |joint| capital(&joint.replace('_', " ")));
+        let place = excess.joint.as_deref().map_or_else(String::new, |joint| format!(", {}", joint.replace('_', " ")));
         vec![
-            channel_title(excess.channel).to_owned(),
-            place,
+            format!("{}{place}", channel_title(excess.channel)),
             as_given(excess.value, &excess.unit),
             as_given(excess.noise_floor, &excess.unit),
             format!("{} \u{d7}", short(excess.value / excess.noise_floor)),
         ]
     };
     let rows = report.mismatch.excess_rms.iter().map(row).collect();
-    table(2, &["Channel", "Joint", "Error RMS", "Noise alone", "Ratio"], rows)
+    table(1, &["", "RMS error", "Noise", "Ratio"], rows)
 }

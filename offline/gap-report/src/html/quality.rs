@@ -1,11 +1,11 @@
 //! What is wrong with the data: failures high up, warnings below, what is in order folded.
 
 use super::tags::{around, list, section, text};
-use crate::{DataQuality, Level, Report, quality_headline};
+use crate::{Level, Report, quality_headline};
 
 /// A box with what must be put right first.
 pub(super) fn failures(report: &Report) -> String {
-    let lines: Vec<String> = report.quality(Level::Fail).map(line).collect();
+    let lines: Vec<String> = report.quality(Level::Fail).map(quality_headline).collect();
     if lines.is_empty() {
         return String::new();
     }
@@ -15,15 +15,9 @@ pub(super) fn failures(report: &Report) -> String {
 
 /// What to keep in mind.
 pub(super) fn warnings(report: &Report) -> String {
-    let items: String = report.quality(Level::Warn).map(|check| text("li", "", &line(check))).collect();
+    let items: String = report.quality(Level::Warn).map(|check| text("li", "", &quality_headline(check))).collect();
     if items.is_empty() {
         return String::new();
     }
     section("Keep in mind about the data", &around("ul", "warn", &items))
-}
-
-/// One check in words, with its run.
-pub(super) fn line(check: &DataQuality) -> String {
-    let run = check.run.as_ref().map_or_else(String::new, |run| format!(" ({run})"));
-    format!("{}{run}", quality_headline(check))
 }

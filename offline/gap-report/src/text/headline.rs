@@ -12,6 +12,21 @@ const LIKELY: f64 = 0.5;
 /// One sentence on one verdict: what the robot has and the simulation lacks, where, how much with its 95 % interval in brackets,
 /// and how sure.
 pub fn headline(verdict: &Verdict) -> String {
+    plain_spaces(&unbroken(verdict))
+}
+
+/// Plain spaces only, and nothing that a terminal would take for a command.
+pub(crate) fn plain_spaces(text: &str) -> String {
+    let plain = |c: char| match c {
+        '\u{a0}' | '\u{202f}' => ' ',
+        c if c.is_control() && c != '\n' => '\u{fffd}',
+        c => c,
+    };
+    text.chars().map(plain).collect()
+}
+
+/// [`headline`] with spaces that do not break between a number and its unit.
+fn unbroken(verdict: &Verdict) -> String {
     let said = sentence(verdict);
     let hedge = match verdict.probability {
         _ if matches!(verdict.physics, Physics::None | Physics::Unmodelled) => "",
@@ -22,12 +37,14 @@ pub fn headline(verdict: &Verdict) -> String {
     format!("{}.", capital(&format!("{hedge}{said}")))
 }
 
-/// One sentence on a check of the data.
+/// One sentence on a check of the data, with its run. What a failure means stands first.
 pub fn quality_headline(check: &DataQuality) -> String {
     let known = LEADS.iter().find(|(name, _)| check.check == *name || check.check.starts_with(&format!("{name} ")));
+    let known = known.filter(|_| check.level == Level::Fail);
     let lead = known.map_or_else(|| capital(&check.check.replace('_', " ")), |(_, lead)| (*lead).to_owned());
+    let run = check.run.as_ref().map_or_else(String::new, |run| format!(" ({run})"));
     let end = if check.message.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{lead}: {}{end}", check.message)
+    format!("{lead}{run}: {}{end}", check.message)
 }
 
 /// Names of checks and what their failure means.
@@ -51,12 +68,17 @@ const LEADS: [(&str, &str); 15] = [
 
 /// The sentences that a report opens with, at least one: the answer, one sentence per effect.
 pub fn headlines(report: &Report) -> Vec<String> {
+    headlines_unbroken(report).iter().map(|sentence| plain_spaces(sentence)).collect()
+}
+
+/// [`headlines`] with spaces that do not break between a number and its unit.
+pub(crate) fn headlines_unbroken(report: &Report) -> Vec<String> {
     let told: Vec<String> = report
         .told()
         .enumerate()
         .map(|(i, verdict)| match verdict.physics {
             Physics::Unmodelled if i > 0 => format!("Beyond that, {}.", sentence(verdict)),
-            _ => headline(verdict),
+            _ => unbroken(verdict),
         })
         .collect();
     match report.status {

@@ -11,8 +11,9 @@ mod words;
 pub use headline::{headline, headlines, quality_headline};
 pub use words::words;
 
+pub(crate) use headline::headlines_unbroken;
 pub(crate) use joints::{capital, joint, joints, listed};
 pub(crate) use number::{Estimate, as_given, count, duration, joined, percent, probability, short, significance, with_unit};
 pub(crate) use parameter::parameter_name;
-pub(crate) use words::{names_something, plain_metric};
 pub(crate) use unit::{Scale, scale, written};
+pub(crate) use words::{names_something, plain_metric};

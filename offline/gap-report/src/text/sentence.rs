@@ -2,7 +2,7 @@
 //! end without a full stop, so that others can be built around them.
 
 use super::joints::{joint, joints};
-use super::number::{Estimate, percent, with_unit};
+use super::number::{Estimate, percent, short, with_unit};
 use super::unit::Scale;
 use crate::{Channel, Feature, Identifiable, Location, Parameter, Physics, Subsystem, Verdict};
 
@@ -126,7 +126,9 @@ impl Facts<'_> {
 
     fn viscous(&self, at: &str) -> String {
         match self.parameter("b") {
-            Some(b) if b.value < 0.0 => format!("friction in {at} grows less with speed than in the simulation, by {}", amount(&size(b))),
+            Some(b) if b.value < 0.0 => {
+                format!("friction in {at} grows less with speed than in the simulation, by {}", amount(&size(b)))
+            }
             _ => format!("friction in {at} grows with speed{}, which the simulation lacks", self.with(" by ", "b")),
         }
     }
@@ -162,9 +164,8 @@ impl Facts<'_> {
     }
 
     fn tilt(&self) -> String {
-        let about = |name: &str, axis: &str| {
-            self.parameter(name).map(|angle| format!("{} about {axis}", amount_in(angle, &degrees())))
-        };
+        let about =
+            |name: &str, axis: &str| self.parameter(name).map(|angle| format!("{} about {axis}", amount_in(angle, &degrees())));
         let axes: Vec<String> = [about("a", "x"), about("b", "y")].into_iter().flatten().collect();
         let by = if axes.is_empty() { String::new() } else { format!(" by {}", axes.join(" and ")) };
         format!("the base is tilted{by} against the simulation")
@@ -191,7 +192,11 @@ impl Facts<'_> {
     }
 
     fn ripple(&self, at: &str) -> String {
-        let times = |order: &Parameter| format!(", {} times per turn", super::number::short(order.value));
+        // Orders are whole numbers, known or fitted.
+        let times = |order: &Parameter| match (order.value - order.value.round()).abs() < 0.05 {
+            true => format!(", {:.0} times per turn", order.value),
+            false => format!(", {} times per turn", short(order.value)),
+        };
         let order = self.parameter("order").map_or_else(String::new, times);
         format!("the motor torque of {at} ripples{}{order}, which the simulation lacks", self.with(" by ", "amp"))
     }

@@ -1,6 +1,6 @@
 //! The report for a terminal.
 
-use super::headline::{headlines, quality_headline};
+use super::headline::{headlines_unbroken, plain_spaces, quality_headline};
 use super::joints::{capital, joints, listed};
 use super::number::{as_given, percent, probability};
 use crate::{Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
@@ -16,7 +16,7 @@ const MOST: usize = 3;
 /// corrected simulation fits, what the answer may be confused with, and the experiment that would decide.
 pub fn words(report: &Report) -> String {
     let mut lines = Vec::new();
-    let sentences = headlines(report);
+    let sentences = headlines_unbroken(report);
     for sentence in sentences.iter().take(MOST + 1) {
         lines.extend(wrapped(sentence, ""));
     }
@@ -34,24 +34,22 @@ pub fn words(report: &Report) -> String {
     rest.extend(report.told().filter(|verdict| verdict.physics.is_named()).filter_map(doubt).map(|line| ("Not excluded", line)));
     rest.extend(report.told().filter_map(|verdict| verdict.suggested_experiment.as_ref()).map(|e| ("Would decide", experiment(e))));
     rest.extend(left_over(report).map(|line| ("Left over", line)));
-    let warnings = report.quality(Level::Warn).count();
-    if warnings > 0 && report.status != Status::InsufficientData {
-        rest.push(("Data", format!("{warnings} warning{}, see report.html", if warnings == 1 { "" } else { "s" })));
-    }
+    rest.extend(report.quality(Level::Warn).take(MOST).map(|check| ("Keep in mind", quality_headline(check))));
     for (name, text) in rest {
-        let block = wrapped(&text, &format!("  {:<16}", format!("{name}:")));
+        let block = wrapped(&text, &format!("  {:<17}", format!("{name}:")));
         if lines.len() + block.len() <= LINES_MAX {
             lines.extend(block);
         }
     }
-    lines.join("\n").replace(['\u{a0}', '\u{202f}'], " ") + "\n"
+    plain_spaces(&lines.join("\n")) + "\n"
 }
 
 /// The figures that tell most: of every told verdict its first, or of all together.
 fn fits(report: &Report) -> Vec<String> {
     let together = report.remaining.fit.iter().flatten();
     let single = report.told().filter_map(|verdict| verdict.fit.first());
-    let fits: Vec<&Fit> = if report.told().count() > 1 { together.chain(single).collect() } else { single.chain(together).collect() };
+    let fits: Vec<&Fit> =
+        if report.told().count() > 1 { together.chain(single).collect() } else { single.chain(together).collect() };
     fits.into_iter().take(MOST).map(improvement).collect()
 }
 
@@ -105,8 +103,9 @@ fn agreement(report: &Report) -> Option<String> {
 
 fn left_over(report: &Report) -> Option<String> {
     let depends = report.remaining.depends_on.as_deref().filter(|names| !names.is_empty())?;
+    let depends: Vec<String> = depends.iter().map(|name| name.replace('_', " ")).collect();
     let share = report.remaining.explained_share.map_or_else(String::new, |share| format!("{} explained; ", percent(share)));
-    Some(format!("{share}the rest goes with {}", listed(depends, "and")))
+    Some(format!("{share}the rest goes with {}", listed(&depends, "and")))
 }
 
 /// Says whether a report names anything.

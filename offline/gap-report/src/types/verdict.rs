@@ -146,9 +146,7 @@ impl Verdict {
 
 /// Verdicts in their order with their ranks: by effect, the primary one first, then by falling probability.
 pub fn ranked(mut verdicts: Vec<Verdict>) -> Vec<Verdict> {
-    verdicts.sort_by(|a, b| {
-        a.effect.cmp(&b.effect).then(a.role.cmp(&b.role)).then(b.probability.total_cmp(&a.probability))
-    });
+    verdicts.sort_by(|a, b| a.effect.cmp(&b.effect).then(a.role.cmp(&b.role)).then(b.probability.total_cmp(&a.probability)));
     for (rank, verdict) in (1..).zip(&mut verdicts) {
         verdict.rank = rank;
     }

@@ -1,8 +1,11 @@
-//! Motors: torque scale and offset.
+//! Motors: torque scale, offset and ripple.
 
 use super::dictionary::Dictionary;
-use super::{Bound, Column, Family};
+use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
+
+/// Most waves per motor turn.
+const ORDERS: u32 = 64;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
@@ -18,7 +21,24 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 .penalised(1.5),
         );
         all.push(Family::fixed("motor_torque_scale", &[j], "offset", TORQUE, &[Bound::Free], move |d| vec![offset(d)]).penalised(1.0));
+        if dictionary.problem.pairs.iter().all(|pair| pair.real.run.motor.is_some()) {
+            let orders: Vec<f64> = (1..=ORDERS).map(f64::from).collect();
+            all.push(
+                Family::shaped("torque_ripple", &[j], "motor turns", TORQUE, &[Bound::Free, Bound::Free], &[("order", false)], product(&[&orders]), move |d, s| {
+                    [0.0, std::f64::consts::FRAC_PI_2].map(|phase| d.effort_of(j, ripple(d, j, s[0], phase), false)).to_vec()
+                })
+                .penalised(4.0),
+            );
+        }
     }
+}
+
+/// A wave so many times per turn of the motor, smoothed as the torque is: what turns fast is gone from both.
+fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64> {
+    dictionary.smoothed(|r| {
+        let motor = dictionary.problem.pairs[r].real.run.motor.as_ref();
+        motor.map_or_else(Vec::new, |motor| motor[j].iter().map(|angle| (order * angle + phase).sin()).collect())
+    })
 }
 
 /// All that the motor gives: load, rotor, nominal friction.

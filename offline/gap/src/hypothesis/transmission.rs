@@ -87,11 +87,11 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             "Bouc-Wen",
             TRANSMISSION,
             &[Bound::Positive, Bound::Free],
-            &[("a", true), ("yield", true)],
-            product(&[&STRAIGHT, &YIELD.map(|share| share * usual)]),
+            &[("a", true), ("yield", true), ("n", false), ("start", true)],
+            product(&[&STRAIGHT, &YIELD.map(|share| share * usual), &[1.0, 2.0], &[0.01, 0.6]]),
             move |d, s| {
                 let load = d.load(j);
-                vec![d.deflection_of(j, per_run(d, &load, |run| bouc_wen(run, s[0], s[1]))), d.deflection_of(j, load)]
+                vec![d.deflection_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.deflection_of(j, load)]
             },
         )
         .penalised(3.0),
@@ -150,17 +150,21 @@ fn per_run(dictionary: &Dictionary, series: &[f64], memory: impl Fn(&[f64]) -> V
     out
 }
 
-/// Deflection times stiffness of a Bouc-Wen element (n = 1, g = 0.5) under a load, where `load = a x + (1 - a) z`.
-fn bouc_wen(load: &[f64], straight: f64, yields: f64) -> Vec<f64> {
-    let mut z = 0.0_f64;
-    let mut x = load.first().copied().unwrap_or(0.0);
-    let mut before = x;
+/// Deflection times stiffness of a Bouc-Wen element (g = 0.5) under a load, where `load = a x + (1 - a) z`. Shape: a, yield
+/// load, n, and the share of the load that z carries at the start, which nobody knows.
+fn bouc_wen(load: &[f64], shape: &[f64]) -> Vec<f64> {
+    let (straight, yields, power) = (shape[0].clamp(0.02, 0.98), shape[1].max(1e-9), shape[2]);
+    let first = load.first().copied().unwrap_or(0.0);
+    let mut z = (shape[3] * first / (1.0 - straight)).clamp(-yields, yields);
+    let mut x = (first - (1.0 - straight) * z) / straight;
+    let mut before = first;
     load.iter()
         .map(|&now| {
             let step = (now - before) / 8.0;
             for _ in 0..8 {
-                // zd = xd (1 - |z|/yield (g + (1-g) sgn(xd z))): loading bends, unloading is straight.
-                let slope = 1.0 - (z.abs() / yields) * if step.signum() * z > 0.0 { 1.0 } else { 0.0 };
+                // zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z))): loading bends, unloading is straight.
+                let bend = if step.signum() * z > 0.0 { (z.abs() / yields).powf(power) } else { 0.0 };
+                let slope = 1.0 - bend;
                 let dx = step / (straight + (1.0 - straight) * slope);
                 x += dx;
                 z = (z + slope * dx).clamp(-yields, yields);

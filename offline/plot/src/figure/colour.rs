@@ -123,7 +123,7 @@ pub static STYLE: std::sync::LazyLock<String> = std::sync::LazyLock::new(|| {
         font-variant-numeric:tabular-nums}.rp .title{font-size:14px;font-weight:600}.rp .label{font-weight:600}\
         .rp .line{fill:none;stroke-width:1.4;stroke-linejoin:round;stroke-linecap:round}.rp .thin{stroke-width:1}\
         .rp .broad{stroke-width:3.2;stroke-opacity:.55}.rp .dashed{stroke-dasharray:5 4}.rp .band{fill-opacity:.16;stroke:none}\
-        .rp .dots{fill-opacity:.35;stroke:none}.rp .steps{fill-opacity:.13;stroke-width:1.4}.rp .grid,.rp .axis{stroke-width:1;fill:none}";
+        .rp .dots{fill-opacity:.35;stroke:none}.rp .few{fill-opacity:.6}.rp .steps{fill-opacity:.13;stroke-width:1.4}.rp .grid,.rp .axis{stroke-width:1;fill:none}";
     format!("{fixed}{}@media (prefers-color-scheme:dark){{{}}}", rules(&LIGHT), rules(&DARK))
 });
 

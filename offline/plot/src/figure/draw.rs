@@ -194,18 +194,25 @@ fn draw(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, mark: &Mark) {
     }
 }
 
+/// Below so many, dots are drawn larger.
+const FEW_DOTS: usize = 400;
+
 /// A single point becomes a stroke too short to have a direction but long enough for its round cap to be seen.
 fn visible(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() == 1 { vec![points[0], points[0]] } else { points.to_vec() }
 }
 
 fn dots(out: &mut String, colour: Colour, points: impl Iterator<Item = (f64, f64)>) {
+    // A few are larger and denser, so that each is seen; many show by their number.
+    let points: Vec<(f64, f64)> = points.collect();
+    let (side, class) = if points.len() < FEW_DOTS { (3.6, "dots few") } else { (2.0, "dots") };
     let mut path = String::new();
-    for (x, y) in points {
-        let _ = write!(path, "M{} {}h2v2h-2z", coordinate(x - 1.0), coordinate(y - 1.0));
+    for (x, y) in &points {
+        let (x, y) = (coordinate(x - 0.5 * side), coordinate(y - 0.5 * side));
+        let _ = write!(path, "M{x} {y}h{side}v{side}h-{side}z");
     }
     if !path.is_empty() {
-        let _ = write!(out, "<path class=\"dots f{}\" d=\"{path}\"/>", colour.number());
+        let _ = write!(out, "<path class=\"{class} f{}\" d=\"{path}\"/>", colour.number());
     }
 }
 

@@ -10,8 +10,8 @@ pub(super) const MARGIN_RIGHT_MIN: f64 = 14.0;
 /// Height of a line of text.
 pub(super) const LINE: f64 = 16.0;
 /// Mean width of a character of 12 px text, and of bold 14 px text.
-pub(super) const CHARACTER: f64 = 6.5;
-pub(super) const CHARACTER_TITLE: f64 = 7.6;
+pub(super) const CHARACTER: f64 = 7.0;
+pub(super) const CHARACTER_TITLE: f64 = 8.6;
 /// Width of a colour bar and its distance from the panel.
 pub(super) const BAR: f64 = 10.0;
 const BAR_GAP: f64 = 10.0;

@@ -133,7 +133,9 @@ pub(crate) fn bent(arm: &SerialArm, effects: &[Effect]) -> SerialArm {
         if let Some(body) = bodies.get_mut(link) {
             body.placement = moved(&body.placement, &body.joint.axis, &change);
         } else {
-            tools.iter_mut().for_each(|tool| tool.pose = moved(&tool.pose, &Vector3::z(), &change));
+            for tool in &mut tools {
+                tool.pose = moved(&tool.pose, &Vector3::z(), &change);
+            }
         }
     }
     if !any {

@@ -9,6 +9,6 @@ mod simulation;
 pub(crate) use build::{bent, build, middle};
 pub use commands::{ranges, speeds, trajectory};
 pub(crate) use sensors::{Seen, Sensors, is_timed};
-pub use servo::default_gains;
 pub(crate) use servo::Servo;
+pub use servo::default_gains;
 pub use simulation::{ArmCycle, ArmSimulation};

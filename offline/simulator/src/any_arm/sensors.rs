@@ -32,9 +32,16 @@ pub(crate) struct Seen {
 /// The way from joints to the tip, as believed and as it is.
 #[derive(Debug, Clone)]
 enum Chain {
-    Serial { believed: Box<SerialArm>, truth: Box<SerialArm>, workspace: Workspace },
+    Serial {
+        believed: Box<SerialArm>,
+        truth: Box<SerialArm>,
+        workspace: Workspace,
+    },
     /// With the joints of the tool, which this plant does not have.
-    Raven { believed: Box<Arm>, truth: Box<Arm> },
+    Raven {
+        believed: Box<Arm>,
+        truth: Box<Arm>,
+    },
 }
 
 /// The instruments of a robot.
@@ -70,10 +77,9 @@ impl Sensors {
             drives.get(i).map_or(0.0, |drive| drive.reduction * (0..n).map(|j| coupling[i][j] * joint_offset[j]).sum::<f64>())
         });
         let chain = match (model.as_raven(), model.as_urdf()) {
-            (Some(raven), _) => Chain::Raven {
-                believed: Box::new(raven.raven.arm(model.side())),
-                truth: Box::new(true_arm(raven, model.side())),
-            },
+            (Some(raven), _) => {
+                Chain::Raven { believed: Box::new(raven.raven.arm(model.side())), truth: Box::new(true_arm(raven, model.side())) }
+            }
             (_, urdf) => {
                 let believed = model.arm();
                 let truth = urdf.map_or_else(|| believed.clone(), crate::model::UrdfRobot::true_arm);
@@ -99,7 +105,7 @@ impl Sensors {
     }
 
     /// Angles counted from joint 0, as the plant has them, for angles as encoders show them.
-    pub(crate) fn from_encoders(&self, motors: &Vector) -> Vector {
+    pub(crate) fn counted_from_zero(&self, motors: &Vector) -> Vector {
         std::array::from_fn(|i| motors[i] + self.zero[i])
     }
 
@@ -151,7 +157,6 @@ impl Sensors {
             motors.copy_from_slice(&late[..JOINTS_MAX]);
             speeds.copy_from_slice(&late[JOINTS_MAX..]);
         }
-        self.quantise(&mut motors);
         if self.stepped {
             self.quantise(&mut motors);
         }

@@ -56,7 +56,7 @@ impl ArmSimulation {
         };
         let mut random = Random::new(seed, HOMING);
         let mut homing_offset = [0.0; JOINTS_MAX];
-        homing_offset.iter_mut().zip(&urdf.homing_offset_sd).for_each(|(offset, sd)| *offset = sd * random.normal());
+        homing_offset.iter_mut().zip(&urdf.homing_offset_sd).for_each(|(offset, sd)| *offset = sd * random.normal() + 0.0);
         let gains = gains.cloned().or_else(|| model.controller()).unwrap_or_else(|| default_gains(model));
         if gains.joints.len() != model.joint_count() {
             return Err(RobotError::Change(format!("the controller needs gains for {} joints", model.joint_count())));
@@ -79,7 +79,7 @@ impl ArmSimulation {
     /// Puts the motors at angles and speeds as encoders show them, the joints where weight and those speeds put them.
     pub fn start_at(&mut self, motors: &Vector, speeds: &Vector) {
         let memories = self.state.memories;
-        self.state = self.plant.at_rest_with(&self.sensors.from_encoders(motors), &memories);
+        self.state = self.plant.at_rest_with(&self.sensors.counted_from_zero(motors), &memories);
         self.state.speeds = *speeds;
         self.state.rates = self.sensors.joints_of(speeds, false);
         self.plant.follow(&mut self.state);

@@ -72,7 +72,7 @@ pub enum RobotError {
 
 /// Line, from 1, of a byte of a text.
 pub(super) fn line_of(text: &str, byte: usize) -> usize {
-    1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|byte| **byte == b'\n').count()
+    1 + text.char_indices().take_while(|(at, _)| *at < byte).filter(|(_, c)| *c == '\n').count()
 }
 
 /// The parser's message with its line number, without the drawing of the place.

@@ -1,10 +1,10 @@
 //! A RAVEN-II: the nominal plant, numbers that differ from it, named physics on top, and what homing leaves to chance.
 
-use arm::{JOINTS, Raven2, Side};
+use arm::{JOINTS, RIGID_JOINTS, Raven2, Side};
 
 use super::drive_model::{Connection, DriveModel};
 use super::effect::Names;
-use super::{Effect, RobotError, RobotModel};
+use super::{ControllerModel, ControllerNumbers, Effect, RobotError, RobotModel};
 use crate::plant::DriveNumbers;
 
 /// A RAVEN-II robot.
@@ -91,7 +91,7 @@ impl Robot {
 
     /// Drives of joints 1 to 3 as [`DriveModel`]s: everything at the motor's shaft.
     pub(super) fn drives(&self, side: Side) -> Vec<DriveModel> {
-        (0..arm::RIGID_JOINTS).map(|joint| self.drive(joint, &crate::robot_plant::base_drive(self, side, joint))).collect()
+        (0..RIGID_JOINTS).map(|joint| self.drive(joint, &crate::robot_plant::base_drive(self, side, joint))).collect()
     }
 
     fn drive(&self, joint: usize, numbers: &DriveNumbers) -> DriveModel {
@@ -122,5 +122,21 @@ impl Robot {
             home: numbers.home,
             torque_ref_nm: numbers.torque_ref_nm / gear,
         }
+    }
+
+    /// Gains at the shaft.
+    pub(super) fn controller(&self, side: Side) -> ControllerModel {
+        let plant = self.raven.plant();
+        let (control, gear) = (&plant.control, plant.transmission.gear_big);
+        let kd = if side == Side::Gold { &control.kd_gold } else { &control.kd_green };
+        let joints = (0..RIGID_JOINTS).map(|i| ControllerNumbers {
+            kp: control.kp[i] / gear,
+            ki: control.ki[i] / gear,
+            kd: kd[i] / gear,
+            velocity_share: 0.0,
+            gravity_share: f64::from(u8::from(control.gravity_feedforward)),
+        });
+        let delay_cycles = plant.sampling.measurement_delay_cycles;
+        ControllerModel { period_s: plant.sampling.period_s, delay_cycles, joints: joints.collect() }
     }
 }

@@ -8,6 +8,17 @@ use super::change::refuse;
 use super::raven_file::{changed, merge};
 use super::{DriveModel, Robot, RobotError};
 
+/// A number of a drive and where the plant file has it.
+struct Change<'a> {
+    before: f64,
+    after: f64,
+    section: &'static str,
+    key: &'static str,
+    numbers: &'a [f64],
+    /// From the shaft or joint to what the plant file has.
+    scale: f64,
+}
+
 impl Robot {
     pub(super) fn set_drive(&mut self, side: Side, joint: usize, wanted: &DriveModel) -> Result<(), RobotError> {
         let now = self.drives(side)[joint];
@@ -15,19 +26,15 @@ impl Robot {
         let gear = plant.transmission.gear_big;
         let half_area = 0.5 / (plant.cable.joint_radius_m[joint] * plant.cable.joint_radius_m[joint]);
         let (motor, friction) = (&plant.motor, &plant.friction);
-        let places: [(f64, f64, &str, &str, &[f64], f64); 11] = [
-            (now.reduction, wanted.reduction, "transmission", "ratio", &plant.transmission.ratio, 1.0),
-            (now.rotor_inertia_kg_m2, wanted.rotor_inertia_kg_m2, "motor", "inertia_capstan", &motor.inertia_capstan, gear),
-            (
-                now.torque_constant_nm_a.unwrap_or_default(),
-                wanted.torque_constant_nm_a.or(now.torque_constant_nm_a).unwrap_or_default(),
-                "motor",
-                "torque_constant_nm_a",
-                &motor.torque_constant_nm_a,
-                1.0,
-            ),
-            (now.motor_coulomb_nm, wanted.motor_coulomb_nm, "friction", "motor_coulomb_nm", &friction.motor_coulomb_nm, gear),
-            (
+        let change = |before: f64, after: f64, section, key, numbers, scale| Change { before, after, section, key, numbers, scale };
+        let constant = now.torque_constant_nm_a.unwrap_or_default();
+        let wanted_constant = wanted.torque_constant_nm_a.unwrap_or(constant);
+        let places = [
+            change(now.reduction, wanted.reduction, "transmission", "ratio", &plant.transmission.ratio[..], 1.0),
+            change(now.rotor_inertia_kg_m2, wanted.rotor_inertia_kg_m2, "motor", "inertia_capstan", &motor.inertia_capstan, gear),
+            change(constant, wanted_constant, "motor", "torque_constant_nm_a", &motor.torque_constant_nm_a, 1.0),
+            change(now.motor_coulomb_nm, wanted.motor_coulomb_nm, "friction", "motor_coulomb_nm", &friction.motor_coulomb_nm, gear),
+            change(
                 now.motor_viscous_nm_s,
                 wanted.motor_viscous_nm_s,
                 "friction",
@@ -35,7 +42,7 @@ impl Robot {
                 &friction.motor_viscous_nm_s,
                 gear,
             ),
-            (
+            change(
                 now.motor_sign_width_rad_s,
                 wanted.motor_sign_width_rad_s,
                 "friction",
@@ -43,35 +50,36 @@ impl Robot {
                 &friction.motor_v_s_rad_s,
                 1.0,
             ),
-            (now.joint_coulomb, wanted.joint_coulomb, "friction", "joint_coulomb", &friction.joint_coulomb, 1.0),
-            (now.joint_viscous, wanted.joint_viscous, "friction", "joint_viscous", &friction.joint_viscous, 1.0),
-            (now.joint_sign_width, wanted.joint_sign_width, "friction", "joint_v_s", &friction.joint_v_s, 1.0),
-            (now.stiffness, wanted.stiffness, "cable", "ke_n", &plant.cable.ke_n, half_area),
-            (now.damping, wanted.damping, "cable", "be_ns_m", &plant.cable.be_ns_m, half_area),
+            change(now.joint_coulomb, wanted.joint_coulomb, "friction", "joint_coulomb", &friction.joint_coulomb, 1.0),
+            change(now.joint_viscous, wanted.joint_viscous, "friction", "joint_viscous", &friction.joint_viscous, 1.0),
+            change(now.joint_sign_width, wanted.joint_sign_width, "friction", "joint_v_s", &friction.joint_v_s, 1.0),
+            change(now.stiffness, wanted.stiffness, "cable", "ke_n", &plant.cable.ke_n, half_area),
+            change(now.damping, wanted.damping, "cable", "be_ns_m", &plant.cable.be_ns_m, half_area),
         ];
         let mut changes = Table::new();
-        let mut reached = now;
-        for (before, after, section, key, numbers, scale) in places {
-            if before != after {
-                let mut numbers = numbers.to_vec();
-                numbers[joint] = after * scale;
-                let numbers = numbers.into_iter().map(Value::Float).collect();
-                merge(&mut changes, table(section, Table::from_iter([(key.to_owned(), Value::Array(numbers))])));
-            }
+        for change in places.iter().filter(|change| change.before != change.after) {
+            let mut numbers = change.numbers.to_vec();
+            numbers[joint] = change.after * change.scale;
+            let numbers = numbers.into_iter().map(Value::Float).collect();
+            merge(&mut changes, table(change.section, Table::from_iter([(change.key.to_owned(), Value::Array(numbers))])));
         }
         if self.cables.is_some() && changes.contains_key("cable") {
             return Err(refuse("this RAVEN-II has pretensioned cables ([cable]); change those"));
         }
-        reached.reduction = wanted.reduction;
-        reached.rotor_inertia_kg_m2 = wanted.rotor_inertia_kg_m2;
-        reached.torque_constant_nm_a = wanted.torque_constant_nm_a.or(now.torque_constant_nm_a);
-        reached.motor_coulomb_nm = wanted.motor_coulomb_nm;
-        reached.motor_viscous_nm_s = wanted.motor_viscous_nm_s;
-        reached.motor_sign_width_rad_s = wanted.motor_sign_width_rad_s;
-        reached.joint_coulomb = wanted.joint_coulomb;
-        reached.joint_viscous = wanted.joint_viscous;
-        reached.joint_sign_width = wanted.joint_sign_width;
-        (reached.stiffness, reached.damping) = (wanted.stiffness, wanted.damping);
+        let reached = DriveModel {
+            reduction: wanted.reduction,
+            rotor_inertia_kg_m2: wanted.rotor_inertia_kg_m2,
+            torque_constant_nm_a: Some(wanted_constant),
+            motor_coulomb_nm: wanted.motor_coulomb_nm,
+            motor_viscous_nm_s: wanted.motor_viscous_nm_s,
+            motor_sign_width_rad_s: wanted.motor_sign_width_rad_s,
+            joint_coulomb: wanted.joint_coulomb,
+            joint_viscous: wanted.joint_viscous,
+            joint_sign_width: wanted.joint_sign_width,
+            stiffness: wanted.stiffness,
+            damping: wanted.damping,
+            ..now
+        };
         if reached != *wanted {
             return Err(refuse(
                 "of a drive of a RAVEN-II only reduction, rotor inertia, torque constant, friction, stiffness and damping can change",

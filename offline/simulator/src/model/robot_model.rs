@@ -7,9 +7,7 @@ use arm::{RIGID_JOINTS, Side};
 use serde::Deserialize;
 
 use super::error::syntax;
-use super::{
-    ControllerModel, ControllerNumbers, DriveModel, Effect, Robot, RobotError, UrdfRobot, raven, raven_file, save, urdf_file,
-};
+use super::{ControllerModel, DriveModel, Effect, Robot, RobotError, UrdfRobot, raven, raven_file, save, urdf_file};
 use crate::plant::{Passive, Plant, PlantError};
 use crate::{any_arm, robot_plant};
 
@@ -296,23 +294,5 @@ impl RobotModel {
             drop(std::fs::remove_file(&aside));
             failed(error)
         })
-    }
-}
-
-impl Robot {
-    /// Gains at the shaft.
-    fn controller(&self, side: Side) -> ControllerModel {
-        let plant = self.raven.plant();
-        let (control, gear) = (&plant.control, plant.transmission.gear_big);
-        let kd = if side == Side::Gold { &control.kd_gold } else { &control.kd_green };
-        let joints = (0..RIGID_JOINTS).map(|i| ControllerNumbers {
-            kp: control.kp[i] / gear,
-            ki: control.ki[i] / gear,
-            kd: kd[i] / gear,
-            velocity_share: 0.0,
-            gravity_share: f64::from(u8::from(control.gravity_feedforward)),
-        });
-        let delay_cycles = plant.sampling.measurement_delay_cycles;
-        ControllerModel { period_s: plant.sampling.period_s, delay_cycles, joints: joints.collect() }
     }
 }

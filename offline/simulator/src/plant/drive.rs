@@ -5,7 +5,7 @@ use crate::physics::{
     PulleyEccentricity, StribeckFriction, ThermalDrift, TorqueRipple, TransmissionRatio, ViscousFriction, smooth_sign,
 };
 
-use super::CableLaw;
+use super::DriveNumbers;
 
 /// An effect and the time in which it acts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,73 +31,6 @@ impl<T> Timed<T> {
 /// Effects that act now.
 pub(crate) fn on<T>(effects: &[Timed<T>]) -> impl Iterator<Item = &T> {
     effects.iter().filter(|timed| timed.on).map(|timed| &timed.effect)
-}
-
-/// Friction of one side of a drive as the plant file has it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Rubbing {
-    /// N·m or N.
-    pub coulomb: f64,
-    /// Per rad/s or m/s.
-    pub viscous: f64,
-    /// Speed over which the sign is smoothed.
-    pub width: f64,
-}
-
-/// What stands between a motor and its joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Between {
-    /// A cable: motor and joint move apart.
-    #[default]
-    Cable,
-    /// Nothing that gives way: the motor turns with the joint, its inertia and friction act on it. The cable law, and what
-    /// effects make of it, then lies between the joint and the ground (a benchmark's spring; of no stiffness for an arm).
-    Rigid,
-}
-
-/// Spring and damper from a joint to the ground.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Passive {
-    /// N·m/rad or N/m.
-    pub stiffness: f64,
-    /// N·m·s/rad or N·s/m.
-    pub damping: f64,
-    /// Position at which the spring is at rest, rad or m.
-    pub rest: f64,
-}
-
-impl Passive {
-    /// Neither spring nor damper.
-    pub const NONE: Self = Self { stiffness: 0.0, damping: 0.0, rest: 0.0 };
-}
-
-/// Nominal numbers of one drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DriveNumbers {
-    /// Motor rad per joint unit.
-    pub ratio: f64,
-    /// Shaft to capstan.
-    pub gear: f64,
-    /// Capstan N·m per motor rad/s².
-    pub inertia: f64,
-    /// Cable stretch per deflection, m per rad (joint 3: 1).
-    pub radius_m: f64,
-    /// Stretch to force.
-    pub cable: CableLaw,
-    /// Friction of motor and gearbox: N·m at the capstan, motor speed.
-    pub motor: Rubbing,
-    /// Friction of the joint: joint units.
-    pub joint: Rubbing,
-    /// Position at which a wrong ratio has no effect, joint units.
-    pub home: f64,
-    /// Capstan torque under which a motor warms up by one unit of heating, N·m.
-    pub torque_ref_nm: f64,
-    /// Capstan torque of one amplifier count, N·m.
-    pub torque_per_count_nm: f64,
-    /// What stands between motor and joint.
-    pub between: Between,
-    /// From the joint to the ground.
-    pub passive: Passive,
 }
 
 /// Nominal numbers and all effects of one drive.
@@ -274,61 +207,6 @@ impl Drive {
         // A flank pushes, it never pulls.
         found.torque = if !loose || damped * taken > 0.0 { damped } else { 0.0 };
         found
-    }
-
-    /// Rates of the memories of this drive, given the torque that the cable transmits.
-    pub(crate) fn memories(&self, torque: f64, deflection_rate: f64, capstan_torque: f64, aux: &[f64], rates: &mut [f64]) {
-        for (cable, slot) in &self.hysteresis {
-            // Without contact the cable is not strained, and its memory stands.
-            let strained = if self.backlash.is_empty() || torque != 0.0 { deflection_rate } else { 0.0 };
-            let known = cable.effect.k;
-            let share = on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, 0.0));
-            rates[*slot] = if cable.on { cable.effect.memory_rate(share * strained, aux[*slot]) } else { 0.0 };
-        }
-        for (creep, slot) in &self.creep {
-            rates[*slot] = if creep.on { creep.effect.rate(torque, aux[*slot]) } else { 0.0 };
-        }
-        for (drift, slot) in &self.thermal {
-            let relative = capstan_torque / self.nominal.torque_ref_nm;
-            rates[*slot] = if drift.on { drift.effect.rate(relative, aux[*slot]) } else { 0.0 };
-        }
-    }
-
-    /// Strains the memory of a hysteresis by a change of the deflection.
-    pub(crate) fn strain(&self, change: f64, aux: &mut [f64]) {
-        for (cable, slot) in self.hysteresis.iter().filter(|(cable, _)| cable.on) {
-            let known = cable.effect.k;
-            let share = on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, 0.0));
-            aux[*slot] += cable.effect.memory_rate(share * change, aux[*slot]);
-        }
-    }
-
-    /// Carries creep and warmth over a time under constant torques, exactly.
-    pub(crate) fn age(&self, torque: f64, capstan_torque: f64, step_s: f64, aux: &mut [f64]) {
-        for (creep, slot) in self.creep.iter().filter(|(creep, _)| creep.on) {
-            let share = -(-step_s / creep.effect.time_s).exp_m1();
-            aux[*slot] += share * creep.effect.time_s * creep.effect.rate(torque, aux[*slot]);
-        }
-        let relative = capstan_torque / self.nominal.torque_ref_nm;
-        for (drift, slot) in self.thermal.iter().filter(|(drift, _)| drift.on) {
-            let share = -(-step_s / drift.effect.time_s).exp_m1();
-            aux[*slot] += share * drift.effect.time_s * drift.effect.rate(relative, aux[*slot]);
-        }
-    }
-
-    /// Capstan torque that must be commanded for one to act, N·m: the inverse of [`Self::applied`].
-    pub(crate) fn commanded(&self, acting_nm: f64) -> f64 {
-        let per_count = self.nominal.torque_per_count_nm;
-        self.scale.iter().rev().filter(|scale| scale.on).fold(acting_nm, |torque, scale| {
-            torque / scale.effect.kappa + scale.effect.d_0 * per_count
-        })
-    }
-
-    /// What of the Coulomb friction is left as the motor is warm.
-    #[inline]
-    pub(crate) fn warm_share(&self, aux: &[f64]) -> f64 {
-        let warm = self.thermal.iter().filter(|(drift, _)| drift.on);
-        warm.fold(1.0, |share, (drift, slot)| share * drift.effect.share(aux[*slot]))
     }
 
     /// Friction of motor and gearbox at a motor speed: N·m at the capstan, and the chord.

@@ -52,7 +52,7 @@ impl Plant {
     /// sample before.
     pub fn needed(&mut self, given: Given, motion: [&Vector; 3], memory: &mut Memory, step_s: f64) -> Needed {
         let n = self.joints;
-        let Some(inverse) = super::inverse(&self.coupling, n) else { return self.at_nothing(motion[0]) };
+        let Some(inverse) = super::inverse(&self.coupling, n) else { return Self::at_nothing(motion[0]) };
         let turned = |matrix: &Matrix, v: &Vector| -> Vector {
             std::array::from_fn(|i| if i < n { (0..n).map(|j| matrix[i][j] * v[j]).sum() } else { 0.0 })
         };
@@ -61,7 +61,7 @@ impl Plant {
             Given::Joints => ([[0.0; JOINTS_MAX]; 3], [0.0; JOINTS_MAX], [[0.0; JOINTS_MAX]; 3]),
         };
         let mut deflection = memory.deflection;
-        let mut needed = self.at_nothing(motion[0]);
+        let mut needed = Self::at_nothing(motion[0]);
         let mut rates = [0.0; JOINTS_MAX];
         for _ in 0..if given == Given::Motors { ROUNDS } else { 1 } {
             let joints = match given {
@@ -90,7 +90,7 @@ impl Plant {
         needed
     }
 
-    fn at_nothing(&self, position: &Vector) -> Needed {
+    fn at_nothing(position: &Vector) -> Needed {
         let zero = [0.0; JOINTS_MAX];
         Needed { torque: zero, motors: *position, joints: *position, deflection: zero, cable: zero }
     }
@@ -168,7 +168,11 @@ impl Plant {
             if missing.abs() <= close {
                 break;
             }
-            if missing > 0.0 { low = at } else { high = at }
+            if missing > 0.0 {
+                low = at;
+            } else {
+                high = at;
+            }
             let mut next = at + missing / cable.stiffness.max(1e-9);
             if cable.torque == 0.0 {
                 // Inside a dead band: to its end first.

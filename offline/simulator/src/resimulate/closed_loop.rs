@@ -1,10 +1,10 @@
 //! The controller drives the plant along the recorded commands.
 
-use arm::JOINTS;
+use arm::{JOINTS, Joints};
 
-use super::{ResimulateError, Run, Simulated};
+use super::{Commands, ResimulateError, Run, Simulated};
 use crate::any_arm::{ArmCycle, ArmSimulation};
-use crate::model::{ControllerModel, RobotModel};
+use crate::model::{ControllerModel, Robot, RobotModel};
 use crate::plant::{JOINTS_MAX, Vector};
 use crate::simulation::{Command, Simulation};
 
@@ -25,58 +25,51 @@ pub struct ClosedLoop<'a> {
 /// # Errors
 /// [`ResimulateError`] without commands, and for effects that cannot be where they are.
 pub fn closed_loop(model: &RobotModel, run: &Run, options: ClosedLoop<'_>) -> Result<Simulated, ResimulateError> {
-    let Some(commands) = &run.joints_d else {
-        let unit = model.joint_kinds()[0].position_unit();
-        return Err(run.missing(&format!("jpos_d_1_{unit}"), "a closed loop needs the commanded position of every joint"));
-    };
-    if model.as_raven().is_some() { raven(model, run, commands, options) } else { any(model, run, commands, options) }
+    let commands = Commands::of_run(model, run)?;
+    match model.as_raven() {
+        Some(robot) => raven(model, robot, run, &commands, options),
+        None => any(model, run, &commands, options),
+    }
 }
 
-fn any(model: &RobotModel, run: &Run, commands: &[Vector], options: ClosedLoop<'_>) -> Result<Simulated, ResimulateError> {
-    let mut simulation = ArmSimulation::new(model, options.gains, options.seed, &commands[0])?;
-    let begin = &commands[0];
+fn any(model: &RobotModel, run: &Run, commands: &Commands, options: ClosedLoop<'_>) -> Result<Simulated, ResimulateError> {
+    let mut simulation = ArmSimulation::new(model, options.gains, options.seed, commands.first())?;
     if options.settle_s > 0.0 {
-        simulation.settle(begin, options.settle_s);
+        simulation.settle(commands.first(), options.settle_s);
     } else if let Some((motors, speeds)) = run.state_at(0) {
         simulation.start_at(&motors, &speeds);
-        let span_s = run.time_s[1] - run.time_s[0];
-        let rates_d = std::array::from_fn(|i| (commands[1][i] - begin[i]) / span_s);
         if let Some(torque) = &run.torque {
-            simulation.begin_with(begin, &rates_d, &torque[0]);
+            simulation.begin_with(commands.first(), &commands.first_rates(), &torque[0]);
         }
     }
     let mut out = Simulated::new(model.joint_count(), run.len());
     let mut sampler = Sampler::new(run, simulation.period_s());
     while let Some(time_s) = sampler.next_tick_s() {
-        let cycle = simulation.tick(&at(run, commands, time_s));
+        let cycle = simulation.tick(&commands.at(time_s));
         sampler.take(&cycle, &mut out);
     }
     Ok(out)
 }
 
-fn raven(model: &RobotModel, run: &Run, commands: &[Vector], options: ClosedLoop<'_>) -> Result<Simulated, ResimulateError> {
-    let Some(robot) = model.as_raven() else { return Ok(Simulated::default()) };
+fn raven(
+    model: &RobotModel,
+    robot: &Robot,
+    run: &Run,
+    commands: &Commands,
+    options: ClosedLoop<'_>,
+) -> Result<Simulated, ResimulateError> {
     let arm = robot.raven.arm(model.side());
-    // Joints of the tool that were not commanded stand at home.
-    let has_tool = commands.iter().any(|row| row[model.joint_count()..].iter().any(|value| *value != 0.0));
-    let all = |row: &Vector| -> [f64; JOINTS] {
-        let kept = if has_tool { JOINTS } else { model.joint_count() };
-        std::array::from_fn(|i| if i < kept { row[i] } else { arm.limits.home()[i] })
-    };
-    let mut simulation = Simulation::new(robot, model.side(), options.seed, &all(&commands[0]))?;
+    let mut simulation = Simulation::new(robot, model.side(), options.seed, &narrow(commands.first()))?;
     if options.settle_s > 0.0 {
-        simulation.settle(&all(&commands[0]), options.settle_s);
-    } else if let Some((motors, speeds)) = run.state_at(0) {
-        let mut start = arm.transmission.motors(&all(&commands[0]));
-        let known = if motors[model.joint_count()..].iter().any(|angle| *angle != 0.0) { JOINTS } else { model.joint_count() };
-        start[..known].copy_from_slice(&motors[..known]);
-        simulation.start_at(&start, &speeds);
+        simulation.settle(&narrow(commands.first()), options.settle_s);
+    } else if let Some((motors, speeds)) = run.start_of_raven(model, commands) {
+        simulation.start_at(&motors, &speeds);
     }
     let (gears, period_s) = (*arm.amplifiers.gear(), robot.raven.plant().sampling.period_s);
     let mut out = Simulated::new(JOINTS, run.len());
     let mut sampler = Sampler::new(run, period_s);
     while let Some(time_s) = sampler.next_tick_s() {
-        let joints_d = all(&at(run, commands, time_s));
+        let joints_d = narrow(&commands.at(time_s));
         let cycle = simulation.tick(&Command::Joints(joints_d));
         let (reported, truth) = (&cycle.reported, &cycle.truth);
         let rates = arm.transmission.joints(&reported.motor_speeds);
@@ -97,20 +90,12 @@ fn raven(model: &RobotModel, run: &Run, commands: &[Vector], options: ClosedLoop
     Ok(out)
 }
 
-fn wide(values: &[f64; JOINTS]) -> Vector {
-    std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
+fn narrow(values: &Vector) -> Joints {
+    std::array::from_fn(|i| values[i])
 }
 
-/// Commands at a time since the first row, s, on the line between two rows.
-fn at(run: &Run, commands: &[Vector], time_s: f64) -> Vector {
-    let time_s = time_s + run.time_s[0];
-    let after = run.time_s.partition_point(|row_s| *row_s <= time_s + 1e-9).min(commands.len() - 1);
-    let before = after.saturating_sub(1);
-    let span_s = run.time_s[after] - run.time_s[before];
-    let share = if span_s > 0.0 { ((time_s - run.time_s[before]) / span_s).clamp(0.0, 1.0) } else { 0.0 };
-    // On a row (but for rounding) the row itself.
-    let share = if share < 1e-6 { 0.0 } else { share };
-    std::array::from_fn(|i| commands[before][i] + share * (commands[after][i] - commands[before][i]))
+fn wide(values: &[f64; JOINTS]) -> Vector {
+    std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
 }
 
 /// Cycles of a controller brought to the rows of a recording.

@@ -101,7 +101,8 @@ mod tests {
     fn a_sampled_sine_comes_back_between_its_samples() {
         let tone = |t: f64| (t * 700.0).sin();
         let run = Run { time_s: (0..400).map(|k| f64::from(k) / 750.0).collect(), ..Run::default() };
-        let rows: Vec<Vector> = run.time_s.iter().map(|t| std::array::from_fn(|i| if i < JOINTS_MAX { tone(*t) } else { 0.0 })).collect();
+        let rows: Vec<Vector> =
+            run.time_s.iter().map(|t| std::array::from_fn(|i| if i < JOINTS_MAX { tone(*t) } else { 0.0 })).collect();
         for (hold, most) in [(Hold::Smooth, 2e-5), (Hold::Line, 0.12)] {
             let held = Held::new(&run, &rows, hold, 4);
             let mut worst = 0.0_f64;

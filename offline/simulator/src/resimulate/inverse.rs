@@ -63,11 +63,7 @@ fn cubic(time_s: &[f64], rows: &[Vector], row: usize, half_width: usize) -> [Vec
     }
     let Some(factor) = normal.cholesky() else { return [rows[row], [0.0; JOINTS_MAX], [0.0; JOINTS_MAX]] };
     let fitted = sums.map(|sum| factor.solve(&sum));
-    [
-        fitted.map(|fit| fit[0]),
-        fitted.map(|fit| fit[1] / scale_s),
-        fitted.map(|fit| 2.0 * fit[2] / (scale_s * scale_s)),
-    ]
+    [fitted.map(|fit| fit[0]), fitted.map(|fit| fit[1] / scale_s), fitted.map(|fit| 2.0 * fit[2] / (scale_s * scale_s))]
 }
 
 /// Torque that a robot needs for a motion, and where the other side of its cables is; see [`crate::plant::Plant::needed`].
@@ -89,7 +85,7 @@ pub fn inverse(model: &RobotModel, motion: &Motion) -> Result<Simulated, Resimul
             plant.at(time_s);
         }
         let position = match motion.given {
-            Given::Motors => sensors.from_encoders(&motion.positions[row]),
+            Given::Motors => sensors.counted_from_zero(&motion.positions[row]),
             Given::Joints => motion.positions[row],
         };
         let parts = [&position, &motion.rates[row], &motion.accelerations[row]];

@@ -8,6 +8,7 @@
 //! numbers, no clocks: the same bits on every run.
 
 mod closed_loop;
+mod commands;
 mod hold;
 mod inverse;
 mod open_loop;
@@ -15,6 +16,7 @@ mod run;
 mod simulated;
 
 pub use closed_loop::{ClosedLoop, closed_loop};
+pub use commands::Commands;
 pub use hold::Hold;
 pub use inverse::{Motion, inverse};
 pub use open_loop::{OpenLoop, open_loop};

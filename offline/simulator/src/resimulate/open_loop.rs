@@ -30,7 +30,9 @@ impl Default for OpenLoop {
 /// [`ResimulateError`] without torque, and for effects that cannot be where they are.
 pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Simulated, ResimulateError> {
     let Some(torque) = &run.torque else {
-        return Err(run.missing("tau_1_nm", "an open loop needs the torque of every motor (tau, dac with known constants, or jtau)"));
+        return Err(
+            run.missing("tau_1_nm", "an open loop needs the torque of every motor (tau, dac with known constants, or jtau)")
+        );
     };
     let mut plant = model.plant()?;
     let mut sensors = Sensors::new(model, run.period_s());
@@ -72,7 +74,7 @@ pub(super) fn gears(plant: &Plant) -> Vector {
 
 fn start(plant: &mut Plant, sensors: &Sensors, run: &Run, row: usize, before: &State) -> State {
     let (motors, speeds) = run.state_at(row).unwrap_or(([0.0; JOINTS_MAX], [0.0; JOINTS_MAX]));
-    let mut state = plant.at_rest_with(&sensors.from_encoders(&motors), &before.memories);
+    let mut state = plant.at_rest_with(&sensors.counted_from_zero(&motors), &before.memories);
     let n = plant.joints();
     state.speeds[..n].copy_from_slice(&speeds[..n]);
     state.rates = sensors.joints_of(&speeds, false);

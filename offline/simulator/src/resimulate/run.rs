@@ -1,8 +1,9 @@
 //! The columns of a recording that a simulation starts from.
 
+use arm::Motors;
 use recordings::Recording;
 
-use super::ResimulateError;
+use super::{Commands, ResimulateError};
 use crate::any_arm::Sensors;
 use crate::model::{Connection, RobotModel};
 use crate::plant::{JOINTS_MAX, Vector, inverse};
@@ -45,20 +46,31 @@ impl Run {
         if time_s.len() < 2 {
             return Err(refuse("has fewer than two rows".to_owned()));
         }
+        if let Some(row) = time_s.windows(2).position(|pair| pair[1] <= pair[0] || !pair[1].is_finite()) {
+            return Err(refuse(format!("its time does not rise after row {}", row + 1)));
+        }
         let columns = Columns { recording, model };
         let mut run = Self { name: recording.name.clone(), time_s, ..Self::default() };
         run.joints_d = columns.joints("jpos_d");
         run.joints = columns.joints("jpos");
         run.true_joints = columns.joints("truth_jpos");
-        run.motors = columns.motors("mpos", "rad").or_else(|| columns.motors_of_joints(run.joints.as_ref()?));
+        run.motors = columns.motors("mpos", "rad").or_else(|| Some(columns.motors_of_joints(run.joints.as_ref()?)));
         run.speeds = columns.motors("mvel", "rad_s");
         run.torque = columns.torque();
         if run.joints_d.is_none() && run.motors.is_none() && run.torque.is_none() && run.true_joints.is_none() {
             let kinds = model.joint_kinds();
             let unit = kinds[0].position_unit();
-            return Err(refuse(format!("has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm")));
+            return Err(refuse(format!(
+                "has no column of this robot's joints, neither jpos_d_1_{unit} nor mpos_1_rad nor tau_1_nm"
+            )));
         }
-        Ok(run)
+        let signals = [&run.joints_d, &run.motors, &run.speeds, &run.torque, &run.joints];
+        let gap =
+            signals.into_iter().flatten().find_map(|rows| rows.iter().position(|row| row.iter().any(|value| !value.is_finite())));
+        match gap {
+            Some(row) => Err(refuse(format!("row {} lacks a command, motor, torque or joint; cut the run there", row + 1))),
+            None => Ok(run),
+        }
     }
 
     /// Rows.
@@ -99,15 +111,26 @@ impl Run {
         /// Rows on either side: a difference of encoder steps over a millisecond is mostly noise.
         const REACH: usize = 5;
         let motors = self.motors.as_ref()?;
-        let speeds = match &self.speeds {
-            Some(speeds) => speeds[row],
-            None => {
-                let (before, after) = (row.saturating_sub(REACH), (row + REACH).min(motors.len() - 1));
-                let span_s = self.time_s[after] - self.time_s[before];
-                std::array::from_fn(|i| if span_s > 0.0 { (motors[after][i] - motors[before][i]) / span_s } else { 0.0 })
-            }
+        let speeds = if let Some(speeds) = &self.speeds {
+            speeds[row]
+        } else {
+            let (before, after) = (row.saturating_sub(REACH), (row + REACH).min(motors.len() - 1));
+            let span_s = self.time_s[after] - self.time_s[before];
+            std::array::from_fn(|i| if span_s > 0.0 { (motors[after][i] - motors[before][i]) / span_s } else { 0.0 })
         };
         Some((motors[row], speeds))
+    }
+
+    /// Motors and speeds in which a RAVEN-II begins the run; tool motors that were not recorded where their commands want them.
+    pub fn start_of_raven(&self, model: &RobotModel, commands: &Commands) -> Option<(Motors, Motors)> {
+        let (motors, speeds) = self.state_at(0)?;
+        let arm = model.as_raven()?.raven.arm(model.side());
+        let mut start = arm.transmission.motors(&std::array::from_fn(|i| commands.first()[i]));
+        let n = model.joint_count();
+        let has_tool = motors[n..].iter().any(|angle| *angle != 0.0);
+        let known = if has_tool { start.len() } else { n };
+        start[..known].copy_from_slice(&motors[..known]);
+        Some((start, std::array::from_fn(|i| speeds[i])))
     }
 
     pub(super) fn missing(&self, column: &str, why: &'static str) -> ResimulateError {
@@ -141,9 +164,9 @@ impl Columns<'_> {
         })
     }
 
-    fn motors_of_joints(&self, joints: &Rows) -> Option<Rows> {
+    fn motors_of_joints(&self, joints: &Rows) -> Rows {
         let (sensors, coupling) = (Sensors::new(self.model, 1e-3), self.model.coupling());
-        Some(joints.iter().map(|joints| sensors.motors_for(joints, &coupling)).collect())
+        joints.iter().map(|joints| sensors.motors_for(joints, &coupling)).collect()
     }
 
     fn torque(&self) -> Option<Rows> {

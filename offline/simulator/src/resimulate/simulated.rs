@@ -107,7 +107,8 @@ impl Simulated {
         Recording { name: name.to_owned(), metadata: metadata.into(), columns, texts: Vec::new() }
     }
 
-    fn row(&self, row: usize) -> ArmCycle {
+    /// One row.
+    pub fn row(&self, row: usize) -> ArmCycle {
         ArmCycle {
             joints_d: self.joints_d.get(row).copied().unwrap_or_default(),
             motors: self.motors[row],

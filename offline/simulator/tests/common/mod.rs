@@ -1,6 +1,7 @@
 //! Shared by the tests: vectors and recordings beside the repository, as tables of numbers with named columns.
 #![allow(dead_code, missing_docs, reason = "each test file uses its own part")]
 
+pub(crate) mod cases;
 pub(crate) mod urdf;
 
 use std::collections::HashMap;

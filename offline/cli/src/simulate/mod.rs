@@ -1,0 +1,61 @@
+//! `ravenpose simulate`: runs of a simulated robot at 1 kHz with their truth: states of a RAVEN-II, tables of any other arm.
+
+mod any_arm;
+mod commands;
+mod raven;
+mod workers;
+
+use simulator::RobotModel;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What the command line says.
+pub(crate) struct Wish<'a> {
+    pub(crate) minutes: Option<f64>,
+    pub(crate) seed: Option<u64>,
+    pub(crate) out: &'a Path,
+    pub(crate) robot: Option<&'a str>,
+    pub(crate) commands: &'a [PathBuf],
+    pub(crate) arm: &'a str,
+    pub(crate) motion: &'a str,
+    pub(crate) format: Option<&'a str>,
+    pub(crate) run_minutes: f64,
+    pub(crate) threads: Option<usize>,
+}
+
+/// A run of one control cycle at least, and no more than ten years in all.
+const MINUTES: std::ops::RangeInclusive<f64> = 1e-4..=5e6;
+
+pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
+    // Without --minutes there are --commands (the parser sees to it), whose length counts.
+    for (name, value) in [("--minutes", wish.minutes.unwrap_or(1.0)), ("--run-minutes", wish.run_minutes)] {
+        if !MINUTES.contains(&value) {
+            return Err(format!("{name} {value}: must be a number of minutes above 0; write {name} 10"));
+        }
+    }
+    let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
+    if model.as_raven().is_some() { raven::run(wish, model) } else { any_arm::run(wish, &model) }
+}
+
+/// Files of the runs, and the summary beside them: none may be there already. Makes the folder.
+fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, PathBuf), String> {
+    let files: Vec<PathBuf> = (1..=runs).map(|run| wish.out.join(format!("run_{run:04}.{format}"))).collect();
+    let summary = wish.out.join("simulation.txt");
+    std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
+    if let Some(file) = files.iter().chain([&summary]).find(|file| file.exists()) {
+        return Err(format!("{}: is there already; choose another --out or remove it", file.display()));
+    }
+    Ok((files, summary))
+}
+
+/// Writes the summary and says in one line what was made.
+fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<ExitCode, String> {
+    crate::output::whole(summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+    let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
+    println!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn name(file: &Path) -> String {
+    file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
