@@ -36,6 +36,7 @@ install:
 	install -d $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/ravenpose/models $(DESTDIR)$(PREFIX)/share/doc/ravenpose
 	install -m 755 target/release/ravenposed $(DESTDIR)$(PREFIX)/bin/
 	if [ -x target/release/ravenpose ]; then install -m 755 target/release/ravenpose $(DESTDIR)$(PREFIX)/bin/; fi
+	for p in ravenpose-generate ravenpose-score; do if [ -x target/release/$$p ]; then install -m 755 target/release/$$p $(DESTDIR)$(PREFIX)/bin/; fi; done
 	install -m 644 bridge/include/ravenpose.h bridge/include/ravenpose.hpp $(DESTDIR)$(PREFIX)/include/
 	install -m 644 target/release/libravenpose_bridge.a $(DESTDIR)$(PREFIX)/lib/
 	install -m 755 target/release/libravenpose_bridge.so $(DESTDIR)$(PREFIX)/lib/libravenpose_bridge.so.1
