@@ -1,10 +1,10 @@
 //! `ravenpose gap`: where simulation and recordings differ, and which physics is missing.
 
 use crate::output;
-use arm::Side;
 use ::gap::analysis::{Given, Options, analyse};
 use ::gap::search::Thresholds;
 use ::gap::verdicts::sha256;
+use arm::Side;
 use gap_report::Status;
 use recordings::open::{Kind, Opened, kind, open};
 use recordings::table::{self, TableSource};
@@ -37,7 +37,11 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     if !wish.sim.is_empty() && wish.sim.len() != wish.real.len() {
-        return Err(format!("{} recordings and {} simulations: give one --sim for each --real, in the same order", wish.real.len(), wish.sim.len()));
+        return Err(format!(
+            "{} recordings and {} simulations: give one --sim for each --real, in the same order",
+            wish.real.len(),
+            wish.sim.len()
+        ));
     }
     if let Some(file) = wish.out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
         return Err(format!("{}: is a file; give a folder with --out", file.display()));

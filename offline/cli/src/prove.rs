@@ -21,7 +21,8 @@ const MISSED: u8 = 1;
 
 /// Makes what is missing, asks what is unanswered, scores all; stopped, it goes on where it was.
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
-    let own = std::env::current_exe().map_err(|error| format!("where this program stands is not known ({error}); call it by its path"))?;
+    let own = std::env::current_exe()
+        .map_err(|error| format!("where this program stands is not known ({error}); call it by its path"))?;
     let (generate, score) = (beside(&own, "ravenpose-generate")?, beside(&own, "ravenpose-score")?);
     let jobs = wish.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).to_string();
     std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
@@ -63,17 +64,23 @@ fn begin(wish: &Wish, tool_sha256: &str) -> Result<(), String> {
         }
         return output::whole(&path, |file| writeln!(file, "{now:#}").map_err(|error| error.to_string()));
     }
-    let begun: Value = serde_json::from_slice(&read(&path)?).map_err(|error| format!("{}: {error}; remove the folder", path.display()))?;
+    let begun: Value =
+        serde_json::from_slice(&read(&path)?).map_err(|error| format!("{}: {error}; remove the folder", path.display()))?;
     for (key, what) in [("matrix", "another matrix"), ("seed", "another seed"), ("tool_sha256", "another build of ravenpose")] {
         if begun[key] != now[key] {
-            return Err(format!("{}: was begun with {what} ({key} {}); give another --out, or remove it", path.display(), begun[key]));
+            return Err(format!(
+                "{}: was begun with {what} ({key} {}); give another --out, or remove it",
+                path.display(),
+                begun[key]
+            ));
         }
     }
     Ok(())
 }
 
 fn call<'a>(program: &Path, words: impl IntoIterator<Item = &'a OsStr>) -> Result<(), String> {
-    let status = Command::new(program).args(words).status().map_err(|error| format!("{}: does not start ({error})", program.display()))?;
+    let status =
+        Command::new(program).args(words).status().map_err(|error| format!("{}: does not start ({error})", program.display()))?;
     if status.success() { Ok(()) } else { Err(format!("{}: ended with {status}; what it says stands above", program.display())) }
 }
 

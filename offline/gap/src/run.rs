@@ -50,7 +50,9 @@ pub enum RunError {
         moves: &'static str,
     },
     /// A sensor that says nothing.
-    #[error("{run}: {column} is the same in every row although {moving}; leave the column out if it was not recorded, or mend the sensor")]
+    #[error(
+        "{run}: {column} is the same in every row although {moving}; leave the column out if it was not recorded, or mend the sensor"
+    )]
     Constant {
         /// File of the run.
         run: String,
@@ -74,7 +76,9 @@ pub enum RunError {
         run: String,
     },
     /// Neither motor nor joint positions of some joint.
-    #[error("{run}: has neither mpos_{joint}_rad nor jpos_{joint}_{unit}; the robot {robot} has {joints} joints, give its recording or another --robot")]
+    #[error(
+        "{run}: has neither mpos_{joint}_rad nor jpos_{joint}_{unit}; the robot {robot} has {joints} joints, give its recording or another --robot"
+    )]
     NoPosition {
         /// File of the run.
         run: String,
@@ -88,7 +92,9 @@ pub enum RunError {
         joints: usize,
     },
     /// Nothing overlaps.
-    #[error("{sim}: its time ({sim_s}) and that of the recording {run} ({run_s}) do not overlap; give the runs in the same order, on one clock")]
+    #[error(
+        "{sim}: its time ({sim_s}) and that of the recording {run} ({run_s}) do not overlap; give the runs in the same order, on one clock"
+    )]
     NoOverlap {
         /// File of the run.
         run: String,
@@ -165,7 +171,12 @@ impl Run {
             names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
         };
         let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
-        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1)]);
+        let reported = all(&[
+            &|j| format!("jpos_{}_{}", j + 1, unit(j)),
+            &|j| format!("q_{}_{}", j + 1, unit(j)),
+            &|j| format!("q_{}", j + 1),
+            &|j| format!("q_des_{}", j + 1),
+        ]);
         let from_motors = motor.is_some();
         let position = match (&motor, reported) {
             (Some(motor), _) => {
@@ -179,11 +190,19 @@ impl Run {
             (None, Some(reported)) => reported,
             (None, None) => {
                 let joint = (0..n).find(|&j| series(&format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
-                return Err(RunError::NoPosition { run, joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n });
+                return Err(RunError::NoPosition {
+                    run,
+                    joint: joint + 1,
+                    unit: unit(joint),
+                    robot: robot.name.clone(),
+                    joints: n,
+                });
             }
         };
         let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
-        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none()).map(at_joints);
+        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)])
+            .filter(|_| from_motors || recording.column("jtau_1_nm").is_none())
+            .map(at_joints);
         let joint_torque = || {
             let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
             all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
@@ -193,7 +212,8 @@ impl Run {
         let counted = || {
             let known = robot.drives.iter().all(|drive| drive.torque_per_count != 0.0);
             let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
-            let torque = counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
+            let torque =
+                counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
             Some(at_joints(torque.collect()))
         };
         let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
@@ -302,7 +322,13 @@ impl Run {
         let value = |s: &[f64], (k, share): (usize, f64)| {
             let next = s[(k + 1).min(last)];
             let between = if share == 0.0 { s[k] } else { s[k] + share * (next - s[k]) };
-            if between.is_finite() || share == 0.0 { between } else if share < 0.5 { s[k] } else { next }
+            if between.is_finite() || share == 0.0 {
+                between
+            } else if share < 0.5 {
+                s[k]
+            } else {
+                next
+            }
         };
         let series = |s: &Vec<f64>| places.iter().map(|place| value(s, *place)).collect::<Vec<f64>>();
         let set = |set: &Vec<Vec<f64>>| set.iter().map(series).collect::<Vec<_>>();
@@ -471,7 +497,8 @@ impl Clock {
         let dt_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
         let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
         let count = (span / dt_s).round() as usize + 1;
-        let uniform = count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
+        let uniform =
+            count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
         Self { start_s, dt_s, count, uniform }
     }
 
@@ -497,5 +524,106 @@ impl Clock {
                 if (time[near] - t).abs() <= 0.5 * self.dt_s { values[near] } else { f64::NAN }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recordings::Column;
+    use simulator::model::RobotModel;
+
+    fn robot() -> Robot {
+        Robot::of(&RobotModel::load("raven2-nominal").expect("it ships"))
+    }
+
+    /// Three motors that turn evenly, a tip every 20 ms, and whatever else; rows at the times given.
+    fn recording(time: &[f64], more: Vec<Column>) -> Recording {
+        let motor = |j: usize| Column::new(format!("mpos_{j}_rad"), time.iter().map(|t| j as f64 * t).collect());
+        let frame = |t: f64| (t / 0.02 - (t / 0.02).round()).abs() < 1e-6;
+        let tip = |axis: &str| {
+            Column::new(format!("truth_{axis}_m"), time.iter().map(|t| if frame(*t) { *t } else { f64::NAN }).collect())
+        };
+        let mut columns = vec![Column::new("t_s", time.to_vec())];
+        columns.extend((1..=3).map(motor));
+        columns.extend(["x", "y", "z"].map(tip));
+        columns.extend(more);
+        Recording { name: "made up".to_owned(), columns, ..Recording::default() }
+    }
+
+    fn even(count: usize, dt_s: f64) -> Vec<f64> {
+        (0..count).map(|i| i as f64 * dt_s).collect()
+    }
+
+    #[test]
+    fn lines_bridge_holes_and_long_ones_are_marked() {
+        let none = f64::NAN;
+        let mut series = [none, 1.0, none, 3.0, none, none, none, 7.0, none];
+        let holes = bridged(&mut series, 0.001, 0.002);
+        assert_eq!(series, [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.0]);
+        assert_eq!(holes, [true, false, false, false, true, true, true, false, true]);
+        assert_eq!(bridged(&mut [none, none], 0.001, 1.0), [true, true]);
+    }
+
+    #[test]
+    fn lost_rows_are_marked_and_cost_no_frame_of_the_camera() {
+        let whole = even(1000, 0.001);
+        let lost: Vec<f64> =
+            whole.iter().copied().enumerate().filter(|(i, _)| *i != 333 && !(500..=600).contains(i)).map(|(_, t)| t).collect();
+        let run = Run::new(&recording(&lost, Vec::new()), &robot()).expect("a run");
+        assert_eq!(run.len(), 1000);
+        assert!(run.position.iter().flatten().all(|q| q.is_finite()));
+        // One row is bridged, a tenth of a second is not believed.
+        assert_eq!(run.mask.iter().filter(|masked| **masked).count(), 101);
+        assert!(run.mask[500] && run.mask[600] && !run.mask[333] && !run.mask[499] && !run.mask[601]);
+        let frames: Vec<usize> = (0..1000).filter(|i| run.tip.as_ref().is_some_and(|tip| tip[0][*i].is_finite())).collect();
+        let recorded: Vec<usize> = (0..1000).step_by(20).filter(|i| !(500..=600).contains(i)).collect();
+        assert_eq!(frames, recorded);
+    }
+
+    #[test]
+    fn joint_encoders_that_come_seldom_are_bridged_by_the_motor() {
+        let time = even(1000, 0.001);
+        let inverse = robot().motor_from_joint.try_inverse().expect("regular");
+        let truth =
+            |j: usize, t: f64| (0..3).map(|k| inverse[(j, k)] * (k + 1) as f64 * t).sum::<f64>() + robot().drives[j].offset - 1e-3;
+        let column = |j: usize| {
+            let unit = if j == 2 { "m" } else { "rad" };
+            let cell = |(i, t): (usize, &f64)| if i % 20 == 0 || i == 999 { truth(j, *t) } else { f64::NAN };
+            Column::new(format!("truth_jpos_{}_{unit}", j + 1), time.iter().enumerate().map(cell).collect())
+        };
+        let run = Run::new(&recording(&time, (0..3).map(column).collect()), &robot()).expect("a run");
+        assert!(run.mask.iter().all(|masked| !masked));
+        for (j, series) in run.truth.expect("encoders").iter().enumerate() {
+            series.iter().zip(&time).for_each(|(q, t)| assert!((q - truth(j, *t)).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn a_simulation_of_another_rate_and_start_comes_to_the_recordings_clock() {
+        let robot = robot();
+        let run = |time: &[f64]| Run::new(&recording(time, Vec::new()), &robot).expect("a run");
+        let later: Vec<f64> = even(300, 0.0025).iter().map(|t| t + 0.1004).collect();
+        let (real, sim) = common(&run(&even(1000, 0.001)), &run(&later)).expect("overlap");
+        assert_eq!((real.len(), sim.len()), (747, 747));
+        assert!((real.start_s - 0.101).abs() < 1e-9 && (sim.start_s - real.start_s).abs() < 1e-12);
+        for (a, b) in real.position.iter().zip(&sim.position) {
+            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{a} {b}"));
+        }
+        let apart: Vec<f64> = even(100, 0.001).iter().map(|t| t + 5.0).collect();
+        let error = common(&run(&even(1000, 0.001)), &run(&apart)).expect_err("no overlap").to_string();
+        assert!(error.contains("5.000 to 5.099 s") && error.contains("0.000 to 0.999 s"), "{error}");
+    }
+
+    #[test]
+    fn times_that_cannot_be_a_clock_are_refused_with_the_row() {
+        let refusal = |time: &[f64]| Run::new(&recording(time, Vec::new()), &robot()).expect_err("refused").to_string();
+        assert!(refusal(&[0.0, 0.001, 0.001, 0.002]).contains("row 3 after the header: time 0.001 s does not rise"));
+        assert!(refusal(&[0.0, 0.001, f64::NAN]).contains("row 3"));
+        assert!(refusal(&[0.0]).contains("has 1 rows"));
+        assert!(refusal(&[]).contains("has 0 rows"));
+        let mut jump = even(1000, 0.001);
+        jump[999] = 1e12;
+        assert!(refusal(&jump).contains("time jumps from 0.998 s to 1000000000000 s"));
     }
 }

@@ -1,7 +1,7 @@
 //! Running the program, reading what it leaves, and data to run it on.
 
-use generator::order::{Order, Sealed, Wanted};
 use gap_report::{Report, Role, Status, Verdict, check};
+use generator::order::{Order, Sealed, Wanted};
 use simulator::RobotModel;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

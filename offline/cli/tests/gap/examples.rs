@@ -17,7 +17,11 @@ fn shared() -> Option<PathBuf> {
 
 fn example(root: &Path, letter: &str) -> Case {
     let run = |kind: &str, k: usize| root.join(letter).join(format!("{kind}_{k}.csv.gz"));
-    Case { robot: root.join("robot.urdf"), real: (1..=2).map(|k| run("real", k)).collect(), sim: (1..=2).map(|k| run("sim", k)).collect() }
+    Case {
+        robot: root.join("robot.urdf"),
+        real: (1..=2).map(|k| run("real", k)).collect(),
+        sim: (1..=2).map(|k| run("sim", k)).collect(),
+    }
 }
 
 /// Analyses an example; the corrected model, if any, is one that `ravenpose simulate` plays.
@@ -31,8 +35,19 @@ fn analysed(letter: &str, judge: impl FnOnce(&gap_report::Report)) {
     let corrected = out.join("corrected.toml");
     if corrected.exists() {
         let runs = folder.file("runs");
-        let done =
-            ravenpose(&["simulate", "--minutes", "0.02", "--seed", "1", "--robot", text(&corrected), "--format", "csv", "--out", text(&runs)]);
+        let done = ravenpose(&[
+            "simulate",
+            "--minutes",
+            "0.02",
+            "--seed",
+            "1",
+            "--robot",
+            text(&corrected),
+            "--format",
+            "csv",
+            "--out",
+            text(&runs),
+        ]);
         assert!(done.status.success(), "{}", errors(&done));
         assert!(runs.join("run_0001.csv").is_file());
     }

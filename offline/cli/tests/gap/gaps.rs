@@ -10,7 +10,12 @@ const FRICTION: f64 = 2.0;
 /// Dry friction of the second joint.
 fn friction(folder: &Folder) -> (Case, Vec<Sealed>) {
     let parameters = [("f_c".to_owned(), FRICTION)].into();
-    made(folder, "gaps", &[Wanted { physics: "coulomb_friction".to_owned(), joint: Some(2), parameters, ..Wanted::default() }], 12.0)
+    made(
+        folder,
+        "gaps",
+        &[Wanted { physics: "coulomb_friction".to_owned(), joint: Some(2), parameters, ..Wanted::default() }],
+        12.0,
+    )
 }
 
 /// A table with its rows changed: row from 1, its cells by the header's names.

@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod common;
+mod document;
 mod examples;
 mod gaps;
 mod made;

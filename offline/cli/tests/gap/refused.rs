@@ -57,19 +57,31 @@ impl Base {
 fn a_file_that_cannot_be_read_is_named_with_the_place_and_the_remedy() {
     let base = Base::new("files", 3.0);
     let (folder, out) = (&base.folder, base.out());
-    let of = |real: PathBuf, sim: Option<PathBuf>, robot: &Path| Case { robot: robot.to_owned(), real: vec![real], sim: sim.into_iter().collect() };
+    let of = |real: PathBuf, sim: Option<PathBuf>, robot: &Path| Case {
+        robot: robot.to_owned(),
+        real: vec![real],
+        sim: sim.into_iter().collect(),
+    };
     let (robot, real, sim) = (&base.case.robot, &base.case.real[0], &base.case.sim[0]);
 
     let missing = folder.file("missing.csv");
     refused(&of(missing.clone(), None, robot).gap(&out), &out, &["missing.csv", "cannot be opened", "check the path"]);
     refused(&of(real.clone(), Some(missing.clone()), robot).gap(&out), &out, &["missing.csv", "cannot be opened"]);
-    refused(&of(real.clone(), Some(sim.clone()), &folder.file("missing.urdf")).gap(&out), &out, &["missing.urdf", "cannot be read", "give a robot file"]);
+    refused(
+        &of(real.clone(), Some(sim.clone()), &folder.file("missing.urdf")).gap(&out),
+        &out,
+        &["missing.urdf", "cannot be read", "give a robot file"],
+    );
     refused(&of(folder.write("empty.csv", ""), None, robot).gap(&out), &out, &["empty.csv", "is empty"]);
-    refused(&of(folder.write("bare.csv", "t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad\n"), None, robot).gap(&out), &out, &["bare.csv", "no rows", "record at least"]);
+    refused(
+        &of(folder.write("bare.csv", "t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad\n"), None, robot).gap(&out),
+        &out,
+        &["bare.csv", "no rows", "record at least"],
+    );
     refused(&of(folder.write("noise.csv", [0xff_u8; 300]), None, robot).gap(&out), &out, &["noise.csv"]);
     refused(&of(folder.file(""), None, robot).gap(&out), &out, &["is a folder"]);
     let broken = folder.write("broken.urdf", "<robot name=\"x\"><link name=\"a\"/><joint");
-    refused(&of(real.clone(), Some(sim.clone()), &broken).gap(&out), &out, &["broken.urdf", "line 1"]);
+    refused(&of(real.clone(), Some(sim.clone()), &broken).gap(&out), &out, &["broken.urdf", "not well-formed XML"]);
     let broken = folder.write("broken.toml", "schema = \"ravenpose-robot/1\"\nname = \n");
     refused(&of(real.clone(), Some(sim.clone()), &broken).gap(&out), &out, &["broken.toml", "line 2"]);
 
@@ -96,24 +108,50 @@ fn a_table_that_is_no_run_of_this_robot_is_refused_with_the_column() {
         std::iter::once(header.to_owned()).chain((0..2000).map(|k| row(f64::from(k) * 1e-3))).collect()
     };
     base.refuses("table.csv", &rows("x_mm,y_mm,z_mm", |t| format!("{t},1,2")), &["table.csv", "t_s"]);
-    base.refuses("foreign.csv", &rows("t_s,volume,pitch", |t| format!("{t},{t},2")), &["foreign.csv", "neither mpos_1_rad nor jpos_1_rad", "--robot"]);
-    base.refuses("unit.csv", &rows("t_s,mpos_1_inch,mpos_2_rad,mpos_3_rad", |t| format!("{t},{t},{t},{t}")), &["unit.csv", "line 1, column 2", "inch", "use rad"]);
+    base.refuses(
+        "foreign.csv",
+        &rows("t_s,volume,pitch", |t| format!("{t},{t},2")),
+        &["foreign.csv", "neither mpos_1_rad nor jpos_1_rad", "--robot"],
+    );
+    base.refuses(
+        "unit.csv",
+        &rows("t_s,mpos_1_inch,mpos_2_rad,mpos_3_rad", |t| format!("{t},{t},{t},{t}")),
+        &["unit.csv", "line 1, column 2", "inch", "use rad"],
+    );
     base.refuses("two.csv", &rows("t_s,mpos_1_rad,mpos_2_rad", |t| format!("{t},{t},{t}")), &["two.csv", "mpos_3_rad", "3 joints"]);
-    base.refuses("kind.csv", &rows("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad,truth_jpos_1_rad,truth_jpos_2_rad,truth_jpos_3_rad", |t| {
-        format!("{t},{t},{t},{t},{t},{t},{t}")
-    }), &["kind.csv", "truth_jpos_3_rad", "joint 3", "slides", "--robot"]);
+    base.refuses(
+        "kind.csv",
+        &rows("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad,truth_jpos_1_rad,truth_jpos_2_rad,truth_jpos_3_rad", |t| {
+            format!("{t},{t},{t},{t},{t},{t},{t}")
+        }),
+        &["kind.csv", "truth_jpos_3_rad", "joint 3", "slides", "--robot"],
+    );
     // Positions alone show nothing of torque, joints or tip.
-    base.refuses("alone.csv", &rows("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad", |t| format!("{t},{t},{t},{t}")), &["alone.csv", "torque", "record tau"]);
+    base.refuses(
+        "alone.csv",
+        &rows("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad", |t| format!("{t},{t},{t},{t}")),
+        &["alone.csv", "torque", "record tau"],
+    );
 }
 
 #[test]
 fn a_bad_cell_is_named_by_line_and_column() {
     let base = Base::new("cells", 3.0);
-    let cell = |row: usize, column: &str, text: &'static str| base.changed(column, |k, old| if k == row { text.to_owned() } else { old.to_owned() });
+    let cell = |row: usize, column: &str, text: &'static str| {
+        base.changed(column, |k, old| if k == row { text.to_owned() } else { old.to_owned() })
+    };
     let place = |row: usize, column: &str| format!("line {}, column {} `{column}`", row + 1, base.column(column) + 1);
-    base.refuses("nan.csv", &cell(700, "tau_2_nm", "NaN"), &["nan.csv", &place(700, "tau_2_nm"), "not a finite number", "remove the row"]);
+    base.refuses(
+        "nan.csv",
+        &cell(700, "tau_2_nm", "NaN"),
+        &["nan.csv", &place(700, "tau_2_nm"), "not a finite number", "remove the row"],
+    );
     base.refuses("inf.csv", &cell(1, "mpos_1_rad", "inf"), &["inf.csv", &place(1, "mpos_1_rad"), "not a finite number"]);
-    base.refuses("word.csv", &cell(12, "truth_jpos_1_rad", "lost"), &["word.csv", &place(12, "truth_jpos_1_rad"), "`lost` is not a number"]);
+    base.refuses(
+        "word.csv",
+        &cell(12, "truth_jpos_1_rad", "lost"),
+        &["word.csv", &place(12, "truth_jpos_1_rad"), "`lost` is not a number"],
+    );
     base.refuses("untimed.csv", &cell(3, "t_s", ""), &["untimed.csv", &place(3, "t_s"), "empty"]);
     // Time stands still, or runs backward.
     let time = base.column("t_s");
@@ -131,7 +169,11 @@ fn a_bad_cell_is_named_by_line_and_column() {
 fn a_dead_sensor_and_a_robot_that_stands_still_are_refused_with_the_column() {
     let base = Base::new("dead", 3.0);
     let held = |column: &str| base.changed(column, |_, _| "0.25".to_owned());
-    base.refuses("truth.csv", &held("truth_jpos_2_rad"), &["truth.csv", "truth_jpos_2_rad", "same in every row", "leave the column out"]);
+    base.refuses(
+        "truth.csv",
+        &held("truth_jpos_2_rad"),
+        &["truth.csv", "truth_jpos_2_rad", "same in every row", "leave the column out"],
+    );
     base.refuses("torque.csv", &held("tau_1_nm"), &["torque.csv", "torque of joint 1", "same in every row"]);
     let still: Vec<String> = std::iter::once("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad,tau_1_nm,tau_2_nm,tau_3_nm".to_owned())
         .chain((0..12_000).map(|k| format!("{:.3},1,2,3,{},0.1,0.1", f64::from(k) * 1e-3, f64::from(k % 7))))
