@@ -50,6 +50,23 @@ pub(super) fn huge_pages(tree: &Tree) -> Finding {
     }
 }
 
+/// May the kernel move locked pages when it compacts memory?
+pub(super) fn compaction(tree: &Tree) -> Finding {
+    let id = "memory.compaction";
+    let path = "/proc/sys/vm/compact_unevictable_allowed";
+    let remedy = "sysctl -w vm.compact_unevictable_allowed=0, and at each boot: \
+                  echo vm.compact_unevictable_allowed = 0 >> /etc/sysctl.d/60-ravenpose.conf";
+    match tree.read(path).as_deref() {
+        Ok("0") => Finding::ok(id, "locked pages stay where they are"),
+        Ok("1") => {
+            let found = "vm.compact_unevictable_allowed = 1: compaction moves locked pages too, and the loop faults on each until it is moved";
+            Finding::warn(id, found, remedy)
+        }
+        Ok(text) => Finding::unknown(id, format!("{path} holds {text:?}"), remedy),
+        Err(cause) => Finding::unknown(id, format!("{cause}; a kernel without CONFIG_COMPACTION has no such file"), remedy),
+    }
+}
+
 /// Is there room for the segments?
 pub(super) fn shared_memory(tree: &Tree) -> Finding {
     match space(&tree.path(SHARED)) {

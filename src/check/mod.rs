@@ -82,6 +82,7 @@ pub fn examine(question: &Question) -> Vec<Finding> {
         limits::cpuset(&tree, question.core),
         memory::swap(&tree),
         memory::huge_pages(&tree),
+        memory::compaction(&tree),
         memory::shared_memory(&tree),
         memory::transport_root(&tree),
         memory::transport_files(&tree),

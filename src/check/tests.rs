@@ -63,6 +63,7 @@ impl Machine {
             ("/sys/fs/cgroup/system.slice/ravenposed.service/cpuset.cpus.effective", "0-3\n"),
             ("/proc/swaps", "Filename\tType\tSize\tUsed\tPriority\n"),
             ("/sys/kernel/mm/transparent_hugepage/enabled", "always [madvise] never\n"),
+            ("/proc/sys/vm/compact_unevictable_allowed", "0\n"),
             ("/dev/shm/iox2_a.data", "x"),
             ("/dev/shm/foreign", "x"),
             ("/tmp/iceoryx2/nodes/x", ""),
@@ -146,6 +147,8 @@ const BAD: &[Case] = &[
     Case { id: "limits.cpuset", files: &[("/sys/fs/cgroup/system.slice/ravenposed.service/cpuset.cpus.effective", "0-2")], level: Level::Fail, found: "cannot go to core 3", remedy: "AllowedCPUs=" },
     Case { id: "memory.swap", files: &[("/proc/swaps", "Filename\n/dev/sda2 partition 1 0 -2")], level: Level::Warn, found: "/dev/sda2", remedy: "swapoff -a" },
     Case { id: "memory.huge_pages", files: &[("/sys/kernel/mm/transparent_hugepage/enabled", "[always] madvise never")], level: Level::Warn, found: "always", remedy: "transparent_hugepage=madvise" },
+    Case { id: "memory.compaction", files: &[("/proc/sys/vm/compact_unevictable_allowed", "1")], level: Level::Warn, found: "moves locked pages", remedy: "sysctl -w vm.compact_unevictable_allowed=0" },
+    Case { id: "memory.compaction", files: &[("/proc/sys/vm/compact_unevictable_allowed", "2")], level: Level::Warn, found: "unknown", remedy: "/etc/sysctl.d/60-ravenpose.conf" },
     Case { id: "transport.root", files: &[("/proc/self/status", "Uid:\t995\t995\t995\t995")], level: Level::Fail, found: "this is raven: the transport has no rights management", remedy: "systemd-tmpfiles --create" },
     Case { id: "transport.files", files: &[("/proc/self/status", "Uid:\t995\t995\t995\t995")], level: Level::Fail, found: "same user", remedy: "iox2_*" },
 ];

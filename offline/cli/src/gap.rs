@@ -1,11 +1,15 @@
 //! `ravenpose gap`: where simulation and recordings differ, and which physics is missing.
 
 use crate::output;
-use crate::plot::read;
 use ::gap::analysis::{Given, Options, analyse};
 use ::gap::search::Thresholds;
 use ::gap::verdicts::sha256;
+use arm::Side;
 use gap_report::Status;
+use recordings::open::{Kind, Opened, kind, open};
+use recordings::table::{self, TableSource};
+use recordings::tidy::{self, StateTable};
+use recordings::{Arms, Recording, csv};
 use simulator::RobotModel;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -33,14 +37,23 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     if !wish.sim.is_empty() && wish.sim.len() != wish.real.len() {
-        return Err(format!("{} recordings and {} simulations: give one --sim for each --real, in the same order", wish.real.len(), wish.sim.len()));
+        return Err(format!(
+            "{} recordings and {} simulations: give one --sim for each --real, in the same order",
+            wish.real.len(),
+            wish.sim.len()
+        ));
+    }
+    if let Some(file) = wish.out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
+        return Err(format!("{}: is a file; give a folder with --out", file.display()));
     }
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
     let mut given = Vec::new();
     for (k, path) in wish.real.iter().enumerate() {
-        let real = read(path)?;
-        let sim = wish.sim.get(k).map(|path| Ok::<_, String>((read(path)?, hash(path)?))).transpose()?;
-        given.push(Given { id: name(path, k, wish.real), real, real_sha256: hash(path)?, sim });
+        let mut notes = Vec::new();
+        let side = model.side();
+        let real = read(path, side, &mut notes)?;
+        let sim = wish.sim.get(k).map(|path| Ok::<_, String>((read(path, side, &mut notes)?, hash(path)?))).transpose()?;
+        given.push(Given { id: name(path, k, wish.real), real, real_sha256: hash(path)?, notes, sim });
     }
     let text = model.to_toml();
     let thresholds = Thresholds::default();
@@ -62,6 +75,8 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         eprint!("\r\x1b[K");
     }
     let outcome = outcome.map_err(|error| error.to_string())?;
+    // What cannot be written at all leaves nothing behind.
+    drop(gap_report::json(&outcome.report).map_err(|error| error.to_string())?);
     std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
     let corrected = wish.out.join("corrected.toml");
     match &outcome.corrected {
@@ -76,6 +91,35 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         Status::NoMismatch => ExitCode::SUCCESS,
         Status::InsufficientData => ExitCode::from(2),
         _ => ExitCode::from(1),
+    })
+}
+
+/// A recording of any format as a table in memory. Tidy CSV is read strictly but for empty cells, which are rows to leave out;
+/// of two arms the robot's is taken; where a file ends early is noted.
+fn read(path: &Path, side: Side, notes: &mut Vec<String>) -> Result<Recording, String> {
+    if kind(path).map_err(|error| error.to_string())? == Kind::Csv {
+        return csv::read_with_gaps(path).map_err(|error| error.to_string());
+    }
+    let mut source = states_or_table(path, None)?;
+    if source.columns().iter().any(|column| column.name.starts_with("green_")) {
+        source = states_or_table(path, Some(if side == Side::Green { Arms::Green } else { Arms::Gold }))?;
+        notes.push(format!("{}: holds both arms; the {} one is looked at", path.display(), side.name()));
+    }
+    let recording = table::collect(&path.display().to_string(), source.as_mut()).map_err(|error| error.to_string())?;
+    if let Some(damage) = source.damage() {
+        notes.push(format!("{}: {}: {}: what stands before it is used", path.display(), damage.place, damage.what));
+    }
+    Ok(recording)
+}
+
+fn states_or_table(path: &Path, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
+    let opened = open(path).map_err(|error| error.to_string())?;
+    Ok(match opened {
+        Opened::Table(source) => source,
+        Opened::States(source) => {
+            let options = tidy::Options { arms, all_truth: false };
+            Box::new(StateTable::new(source, options).map_err(|error| error.to_string())?)
+        }
     })
 }
 

@@ -9,6 +9,7 @@ mod output;
 mod pair;
 mod plot;
 mod progress;
+mod prove;
 mod record;
 mod simulate;
 mod stats;
@@ -103,6 +104,21 @@ enum Command {
         #[arg(long)]
         trace: bool,
     },
+    /// Concealed-truth trials of `gap`: recordings with sealed causes, answers, score; stopped, it goes on where it was
+    Prove {
+        /// Which set of cases
+        #[arg(long, default_value = "small", value_parser = ["small", "full", "dev"])]
+        matrix: String,
+        /// All cases follow from it
+        #[arg(long)]
+        seed: u64,
+        /// Folder of the trial
+        #[arg(long)]
+        out: PathBuf,
+        /// Cases at one time; the score does not depend on it
+        #[arg(long)]
+        jobs: Option<usize>,
+    },
     /// Log the running service's states and poses to MCAP, on one clock; a kill loses at most the last second
     Record {
         /// File to write; it stands as NAME.part until the end
@@ -184,6 +200,7 @@ fn main() -> ExitCode {
         Command::Gap { real, sim, robot, out, seed, trace } => {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace })
         }
+        Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds } => record::run(&out, seconds),
         Command::Simulate { minutes, seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {

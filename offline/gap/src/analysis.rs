@@ -15,7 +15,7 @@ use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, common};
 use crate::search::{Answer, Thresholds, search};
-use crate::{corrected, flexible, verdicts};
+use crate::{builtin, corrected, flexible, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -26,6 +26,8 @@ pub struct Given {
     pub real: Recording,
     /// SHA-256 of its file.
     pub real_sha256: String,
+    /// Where the files of recording and simulation end early, and what should be known of them.
+    pub notes: Vec<String>,
     /// What a simulator made of the same commands, with the SHA-256 of its file.
     pub sim: Option<(Recording, String)>,
 }
@@ -98,6 +100,8 @@ pub struct Found<'a> {
 
 /// Least length of what is fitted on, s.
 const SHORTEST_S: f64 = 6.0;
+/// Fewest rows of a run.
+const LEAST_ROWS: usize = 20;
 /// Share of a single run that is held out.
 const HELD_OUT: f64 = 1.0 / 3.0;
 /// Length of a block, s; long runs take longer ones.
@@ -118,7 +122,10 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let mut runs = Vec::new();
     for one in given {
         let real = Run::new(&one.real, &robot)?;
-        let sim = one.sim.as_ref().map(|(sim, _)| Run::new(sim, &robot)).transpose()?;
+        let sim = match &one.sim {
+            Some((sim, _)) => Some(Run::new(sim, &robot)?),
+            None => builtin::simulated(model, &one.real).and_then(|sim| Run::new(&sim, &robot).ok()),
+        };
         runs.push(match sim {
             Some(sim) => {
                 let (real, sim) = common(&real, &sim)?;
@@ -128,6 +135,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         });
     }
     let mut quality = gates::check(&robot, &runs);
+    for one in given {
+        quality.extend(one.notes.iter().map(|note| DataQuality::new("damage", Level::Warn, note.clone()).run(one.id.clone())));
+    }
+    if model.as_raven().is_none() {
+        quality.extend(gates::beyond(&robot, &given[0].real, &given[0].id));
+    }
     // A simulation with its input reversed says nothing of the robot: the robot's own numbers stand in for it.
     if quality.iter().any(|q| q.check == "input_sign" && q.level == Level::Fail && q.message.contains("simulation")) {
         runs.iter_mut().for_each(|run| run.1 = None);
@@ -146,6 +159,11 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let pair = |(real, sim): &(Run, Option<Run>)| Pair { real: Motion::new(real.clone(), band), sim: sim.clone().map(|sim| Motion::new(sim, band)) };
     let train: Vec<Pair> = train.iter().map(pair).collect();
     let held: Vec<Pair> = held.iter().map(pair).collect();
+    let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
+    if seen_s < 0.5 * SHORTEST_S || train.iter().chain(&held).any(|pair| pair.real.rows.len() < LEAST_ROWS) {
+        quality.insert(0, too_few(seen_s));
+        return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
+    }
     progress("learning what the simulator believes");
     let sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
     let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
@@ -187,7 +205,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         unmodelled,
     };
     progress("judging on what was held out");
-    let corrected = (!answer.effects.is_empty()).then(|| corrected::model(model, &found, !sims.is_empty()));
+    let corrected = (!answer.effects.is_empty()).then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
     let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected);
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);
@@ -200,6 +218,14 @@ fn too_short(seconds: f64) -> DataQuality {
     let needed = SHORTEST_S / (1.0 - HELD_OUT);
     DataQuality::new("too_short", Level::Fail, format!("{seconds:.1} s are left to fit on; record at least {needed:.0} s, better two runs of 30 s, all joints moving"))
         .value(seconds, "s")
+}
+
+fn too_few(seconds: f64) -> DataQuality {
+    let message = format!(
+        "{seconds:.1} s without empty cells and lost rows are left to fit on; record at least {:.0} s without gaps, better two runs of 30 s",
+        SHORTEST_S / (1.0 - HELD_OUT)
+    );
+    DataQuality::new("gaps", Level::Fail, message).value(seconds, "s")
 }
 
 /// What is fitted on, and what is held out: the last quarter of the runs, at least one; of a single run its last third.

@@ -2,6 +2,8 @@
 
 use gap_report::{DataQuality, Level};
 
+use recordings::Recording;
+
 use crate::motion::Motion;
 use crate::nominal::{Nominal, rms};
 use crate::robot::Robot;
@@ -11,11 +13,12 @@ use crate::run::Run;
 const MOVING: f64 = 0.05;
 
 /// Checks the runs; failures first.
-pub fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+pub(crate) fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     let mut all = input_sign(robot, runs);
     for (real, sim) in runs {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
+        all.extend(gaps(real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
         }
@@ -45,7 +48,12 @@ fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     let mut all = Vec::new();
     let n = robot.joint_count();
     let mean_power = |of: &dyn Fn(&(Run, Option<Run>), usize) -> Option<f64>| -> Option<Vec<f64>> {
-        (0..n).map(|j| { let each: Option<Vec<f64>> = runs.iter().map(|run| of(run, j)).collect(); each.map(|e| crate::nominal::mean(&e)) }).collect()
+        (0..n)
+            .map(|j| {
+                let each: Option<Vec<f64>> = runs.iter().map(|run| of(run, j)).collect();
+                each.map(|e| crate::nominal::mean(&e))
+            })
+            .collect()
     };
     let Some(real) = mean_power(&|run, j| run.0.torque.as_ref().map(|t| power(&t[j], &velocity(&run.0, j)))) else { return all };
     // The simulation was driven by the same commands: its own torque where it has one, else the recording's.
@@ -67,10 +75,17 @@ fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
         );
         all.push(DataQuality::new("input_sign", Level::Fail, message));
     } else if reversed(&real) {
-        let message = format!("the recording's torque has the other sign than its motion: its joints give power back all the time (correlation of torque and velocity {})", said(&real));
+        let message = format!(
+            "the recording's torque has the other sign than its motion: its joints give power back all the time (correlation of torque and velocity {})",
+            said(&real)
+        );
         all.push(DataQuality::new("input_sign", Level::Fail, message));
     } else {
-        all.push(DataQuality::new("input_sign", Level::Ok, format!("torque drives the motion (correlation of torque and velocity {})", said(&real))));
+        all.push(DataQuality::new(
+            "input_sign",
+            Level::Ok,
+            format!("torque drives the motion (correlation of torque and velocity {})", said(&real)),
+        ));
     }
     all
 }
@@ -81,7 +96,10 @@ fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
         .filter_map(|j| {
             let (low, high) = run.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
             (high - low < 1e-4).then(|| {
-                let message = format!("{} does not move: nothing can be said of its friction or transmission; move every joint", robot.joints[j]);
+                let message = format!(
+                    "{} does not move: nothing can be said of its friction or transmission; move every joint",
+                    robot.joints[j]
+                );
                 DataQuality::new("excitation", Level::Warn, message).run(run.id.clone())
             })
         })
@@ -101,6 +119,37 @@ fn repeated(run: &Run) -> Option<DataQuality> {
         let message = format!("{share:.1} % of the samples in motion repeat the one before: polled faster than updated");
         DataQuality::new("duplicates", Level::Warn, message).run(run.id.clone()).value(share, "%")
     })
+}
+
+/// Samples that were not recorded.
+fn gaps(run: &Run) -> Vec<DataQuality> {
+    let share = 100.0 * run.mask.iter().filter(|masked| **masked).count() as f64 / run.len().max(1) as f64;
+    let masked = (share > 0.0).then(|| {
+        let message = format!("{share:.1} % of the samples were not recorded (empty cells, lost rows) and are left out");
+        let level = if share > 1.0 { Level::Warn } else { Level::Ok };
+        DataQuality::new("gaps", level, message).run(run.id.clone()).value(share, "%")
+    });
+    let left_out = run.left_out.iter().map(|name| {
+        let message = format!("more than half of the cells of {name} are empty: this channel is not looked at");
+        DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
+    });
+    masked.into_iter().chain(left_out).collect()
+}
+
+/// Joints of a recording that the robot does not have.
+pub(crate) fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<DataQuality> {
+    let n = robot.joint_count();
+    let has = |j: usize| {
+        ["mpos_J_rad", "jpos_J_rad", "jpos_J_m", "q_J_rad", "q_J_m"]
+            .iter()
+            .any(|name| recording.column(&name.replace('J', &j.to_string())).is_some())
+    };
+    let last = (n + 1..=99).take_while(|j| has(*j)).last()?;
+    let message = format!(
+        "the recording has {last} joints, the robot {} has {n}: those beyond are not looked at; their weight and their couplings are missing",
+        robot.name
+    );
+    Some(DataQuality::new("joints", Level::Warn, message).run(run).value(last as f64, "1"))
 }
 
 /// A simulation that does not move as the recording does.
@@ -123,13 +172,16 @@ fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
 }
 
 /// How well the tool's own model follows the simulator.
-pub fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
+pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
     if sims.is_empty() {
         return Vec::new();
     }
     (0..robot.joint_count())
         .filter_map(|j| {
-            let usual = rms(sims.iter().filter_map(|sim| sim.torque.as_ref().map(|t| (sim, t))).flat_map(|(sim, t)| sim.rows.iter().map(move |&i| t[j][i])));
+            let usual = rms(sims
+                .iter()
+                .filter_map(|sim| sim.torque.as_ref().map(|t| (sim, t)))
+                .flat_map(|(sim, t)| sim.rows.iter().map(move |&i| t[j][i])));
             let share = nominal.torque_error[j] / usual.max(1e-12);
             (share > 0.5).then(|| {
                 let message = format!("{:.0} % of the simulated torque of {} is not understood", 100.0 * share, robot.joints[j]);

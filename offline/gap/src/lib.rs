@@ -18,6 +18,7 @@ pub mod score;
 pub mod search;
 
 pub mod analysis;
+pub mod builtin;
 mod corrected;
 mod experiment;
 mod gates;

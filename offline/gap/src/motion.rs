@@ -62,15 +62,29 @@ impl Motion {
         let window = Window::new(band.sigma_s, run.dt_s);
         let smooth = |set: &[Vec<f64>], derivative: usize| set.iter().map(|s| window.apply(s, derivative)).collect::<Vec<_>>();
         let quick = Window::new(QUICK_SIGMA_S.min(band.sigma_s), run.dt_s);
-        let deflection: Option<Vec<Vec<f64>>> = run.truth.as_ref().map(|truth| {
-            run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect()
-        });
+        let deflection: Option<Vec<Vec<f64>>> = run
+            .truth
+            .as_ref()
+            .map(|truth| run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect());
         let slow = Window::new(DEFLECTION_SIGMA_S.max(band.sigma_s), run.dt_s);
         let margin = window.margin();
         let step = ((band.step_s / run.dt_s).round() as usize).max(1);
         let usable = margin..run.len().saturating_sub(margin);
+        // A row whose window touches what was not recorded says nothing.
+        let mut bridged = Vec::with_capacity(run.len() + 1);
+        bridged.push(0_usize);
+        bridged.extend(run.mask.iter().scan(0, |sum, masked| {
+            *sum += usize::from(*masked);
+            Some(*sum)
+        }));
+        let seen = |i: usize| bridged[(i + margin + 1).min(run.len())] == bridged[i.saturating_sub(margin)];
+        let mut rows: Vec<usize> = usable.clone().step_by(step).filter(|i| seen(*i)).collect();
+        // The first two tell how far rows are apart.
+        while rows.len() > 1 && rows[1] - rows[0] != step {
+            rows.remove(0);
+        }
         let tip_rows = run.tip.as_ref().map_or_else(Vec::new, |tip| {
-            usable.clone().filter(|&i| tip.iter().all(|axis| axis[i].is_finite())).collect::<Vec<_>>()
+            usable.clone().filter(|&i| seen(i) && tip.iter().all(|axis| axis[i].is_finite())).collect::<Vec<_>>()
         });
         // A tip at every sample is thinned like the rest.
         let tip_rows = if tip_rows.len() * 2 > usable.len() { tip_rows.into_iter().step_by(step).collect() } else { tip_rows };
@@ -82,7 +96,7 @@ impl Motion {
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
             slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
             deflection: deflection.as_ref().map(|d| smooth(d, 0)),
-            rows: usable.step_by(step).collect(),
+            rows,
             tip_rows,
             window,
             run,
@@ -121,4 +135,47 @@ pub struct State {
     pub velocity: Vec<f64>,
     /// rad/s² or m/s².
     pub acceleration: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_whose_window_touches_a_hole_are_left_out() {
+        let count = 2000;
+        let series: Vec<f64> = (0..count).map(|i| f64::from(i) * 1e-3).collect();
+        let mut mask = vec![false; count as usize];
+        mask[1000..1100].fill(true);
+        mask[90] = true;
+        let run = Run {
+            id: String::new(),
+            start_s: 0.0,
+            dt_s: 0.001,
+            position: vec![series.clone()],
+            torque: None,
+            truth: None,
+            command: None,
+            motor: None,
+            tip: Some([series.clone(), series.clone(), series]),
+            mask,
+            left_out: Vec::new(),
+        };
+        let motion = Motion::new(run, Band::SLOW);
+        let margin = motion.window.margin();
+        for rows in [&motion.rows, &motion.tip_rows] {
+            assert!(rows.iter().all(|&i| i.abs_diff(90) > margin && (i + margin < 1000 || i > 1099 + margin)), "{rows:?}");
+        }
+        // Every other row of the grid is there, and the first two are one step apart.
+        let step = motion.rows[1] - motion.rows[0];
+        assert_eq!(step, 20);
+        assert!(motion.rows.iter().all(|i| (i - motion.rows[0]) % step == 0));
+        assert_eq!(
+            motion.rows.len(),
+            (margin..2000 - margin)
+                .step_by(20)
+                .filter(|i| i.abs_diff(90) > margin && (i + margin < 1000 || *i > 1099 + margin))
+                .count()
+        );
+    }
 }

@@ -5,9 +5,70 @@ use recordings::Recording;
 
 use crate::robot::Robot;
 
+/// Longest stretch without a value that is bridged by a line; what lies around a longer one is left out, s.
+const HOLE_S: f64 = 0.005;
+/// The same for joint encoders: they are bridged as the difference to the motor, which changes slowly, s.
+const HOLE_OF_TRUTH_S: f64 = 0.025;
+/// A channel that would leave less than this share of a run is left out instead.
+const KEEP: f64 = 0.5;
+/// Samples of the uniform clock per row of the file at most: further apart, a time is taken for wrong.
+const SPREAD: f64 = 20.0;
+
 /// Why a recording cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RunError {
+    /// Fewer than two rows.
+    #[error("{run}: has {rows} rows; record at least 9 s, better two runs of 30 s")]
+    Rows {
+        /// File of the run.
+        run: String,
+        /// Their number.
+        rows: usize,
+    },
+    /// Time that is not one.
+    #[error("{run}: row {row} after the header: {what}")]
+    Time {
+        /// File of the run.
+        run: String,
+        /// Row, from 1.
+        row: usize,
+        /// What is wrong and what would do.
+        what: String,
+    },
+    /// A joint of another kind.
+    #[error("{run}: has {column}, but joint {joint} of the robot {robot} {moves}; give the robot of this recording with --robot")]
+    OtherJoint {
+        /// File of the run.
+        run: String,
+        /// The column that tells.
+        column: String,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// The robot.
+        robot: String,
+        /// What the robot's joint does.
+        moves: &'static str,
+    },
+    /// A sensor that says nothing.
+    #[error(
+        "{run}: {column} is the same in every row although {moving}; leave the column out if it was not recorded, or mend the sensor"
+    )]
+    Constant {
+        /// File of the run.
+        run: String,
+        /// The column.
+        column: String,
+        /// Why it should not be.
+        moving: String,
+    },
+    /// A robot that stands still.
+    #[error("{run}: nothing moves: {column} and every other position is the same in every row; record while all joints move")]
+    Still {
+        /// File of the run.
+        run: String,
+        /// The first position.
+        column: String,
+    },
     /// A table without a time.
     #[error("{run}: has no column t_s; give a run with time, not a table")]
     NoTime {
@@ -15,7 +76,9 @@ pub enum RunError {
         run: String,
     },
     /// Neither motor nor joint positions of some joint.
-    #[error("{run}: has neither mpos_{joint}_rad nor jpos_{joint}_{unit}; the robot {robot} has {joints} joints, give its recording or another --robot")]
+    #[error(
+        "{run}: has neither mpos_{joint}_rad nor jpos_{joint}_{unit}; the robot {robot} has {joints} joints, give its recording or another --robot"
+    )]
     NoPosition {
         /// File of the run.
         run: String,
@@ -29,10 +92,18 @@ pub enum RunError {
         joints: usize,
     },
     /// Nothing overlaps.
-    #[error("{run}: its time and that of its simulation do not overlap; give the runs in the same order")]
+    #[error(
+        "{sim}: its time ({sim_s}) and that of the recording {run} ({run_s}) do not overlap; give the runs in the same order, on one clock"
+    )]
     NoOverlap {
         /// File of the run.
         run: String,
+        /// Its first and last time.
+        run_s: String,
+        /// File of the simulation.
+        sim: String,
+        /// Its first and last time.
+        sim_s: String,
     },
 }
 
@@ -57,6 +128,10 @@ pub struct Run {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
     pub tip: Option<[Vec<f64>; 3]>,
+    /// Samples that were not recorded, in which the series are bridged: nothing may be concluded from them.
+    pub mask: Vec<bool>,
+    /// Columns left out because most of their cells are empty.
+    pub left_out: Vec<String>,
 }
 
 impl Run {
@@ -83,15 +158,25 @@ impl Run {
         let run = recording.name.clone();
         let time = recording.time_s().ok_or_else(|| RunError::NoTime { run: run.clone() })?;
         let n = robot.joint_count();
-        let clock = Clock::new(time);
-        let series = |name: &str| recording.column(name).map(|column| clock.resample(time, column));
+        let clock = Clock::of(&run, time)?;
+        same_kinds(&run, recording, robot)?;
+        // A column without a single value is not there.
+        let series = |name: &str| {
+            let column = recording.column(name).filter(|column| column.iter().any(|x| x.is_finite()))?;
+            Some(clock.resample(time, column))
+        };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
         // The first of the names that every joint has.
         let all = |names: &[&dyn Fn(usize) -> String]| {
             names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
         };
         let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
-        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1)]);
+        let reported = all(&[
+            &|j| format!("jpos_{}_{}", j + 1, unit(j)),
+            &|j| format!("q_{}_{}", j + 1, unit(j)),
+            &|j| format!("q_{}", j + 1),
+            &|j| format!("q_des_{}", j + 1),
+        ]);
         let from_motors = motor.is_some();
         let position = match (&motor, reported) {
             (Some(motor), _) => {
@@ -105,11 +190,19 @@ impl Run {
             (None, Some(reported)) => reported,
             (None, None) => {
                 let joint = (0..n).find(|&j| series(&format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
-                return Err(RunError::NoPosition { run, joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n });
+                return Err(RunError::NoPosition {
+                    run,
+                    joint: joint + 1,
+                    unit: unit(joint),
+                    robot: robot.name.clone(),
+                    joints: n,
+                });
             }
         };
         let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
-        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none()).map(at_joints);
+        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)])
+            .filter(|_| from_motors || recording.column("jtau_1_nm").is_none())
+            .map(at_joints);
         let joint_torque = || {
             let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
             all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
@@ -119,7 +212,8 @@ impl Run {
         let counted = || {
             let known = robot.drives.iter().all(|drive| drive.torque_per_count != 0.0);
             let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
-            let torque = counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
+            let torque =
+                counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
             Some(at_joints(torque.collect()))
         };
         let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
@@ -127,17 +221,130 @@ impl Run {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
             _ => None,
         };
-        Ok(Self {
+        let mut made = Self {
             id: run,
             start_s: clock.start_s,
             dt_s: clock.dt_s,
+            mask: vec![false; position[0].len()],
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
             truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
-        })
+            left_out: Vec::new(),
+        };
+        made.alive(robot)?;
+        made.bridge();
+        Ok(made)
+    }
+
+    /// A sensor that is the same in every row while its joint moves is broken or was not recorded.
+    fn alive(&self, robot: &Robot) -> Result<(), RunError> {
+        let moves: Vec<bool> = self.position.iter().map(|series| !constant(series)).collect();
+        let name = |quantity: &str, j: usize, unit: &str| format!("{quantity}_{}_{unit}", j + 1);
+        let Some(moving) = moves.iter().position(|moves| *moves) else {
+            let column = if self.motor.is_some() { name("mpos", 0, "rad") } else { name("jpos", 0, robot.position_unit(0)) };
+            return Err(RunError::Still { run: self.id.clone(), column });
+        };
+        let dead = |column: String, moving: usize| {
+            Err(RunError::Constant { run: self.id.clone(), column, moving: format!("joint {} moves", moving + 1) })
+        };
+        for j in (0..moves.len()).filter(|j| moves[*j]) {
+            if self.torque.as_ref().is_some_and(|torque| constant(&torque[j])) {
+                return dead(format!("the torque of joint {}", j + 1), j);
+            }
+            if self.truth.as_ref().is_some_and(|truth| constant(&truth[j])) {
+                return dead(name("truth_jpos", j, robot.position_unit(j)), j);
+            }
+        }
+        if self.tip.as_ref().is_some_and(|tip| tip.iter().all(|axis| constant(axis))) {
+            return dead("the measured tip (truth_x, truth_y, truth_z)".to_owned(), moving);
+        }
+        Ok(())
+    }
+
+    /// Draws lines over cells that are empty, and marks those that are too long to be believed.
+    fn bridge(&mut self) {
+        let dt_s = self.dt_s;
+        for series in &mut self.position {
+            mark(&mut self.mask, &bridged(series, dt_s, HOLE_S));
+        }
+        let length = self.mask.len();
+        // A channel that is mostly not there must not take the others with it.
+        let mut keep = |name: &str, holes: Vec<bool>, mask: &mut Vec<bool>| {
+            let kept = (holes.iter().filter(|hole| !**hole).count() as f64) >= KEEP * length as f64;
+            if kept {
+                mark(mask, &holes);
+            } else {
+                self.left_out.push(name.to_owned());
+            }
+            kept
+        };
+        if let Some(torque) = &mut self.torque {
+            let mut holes = vec![false; length];
+            torque.iter_mut().for_each(|series| mark(&mut holes, &bridged(series, dt_s, HOLE_S)));
+            if !keep("tau", holes, &mut self.mask) {
+                self.torque = None;
+            }
+        }
+        if let Some(truth) = &mut self.truth {
+            let mut holes = vec![false; length];
+            for (truth, position) in truth.iter_mut().zip(&self.position) {
+                let mut deflection: Vec<f64> = position.iter().zip(&*truth).map(|(m, q)| m - q).collect();
+                mark(&mut holes, &bridged(&mut deflection, dt_s, HOLE_OF_TRUTH_S));
+                truth.iter_mut().zip(position).zip(deflection).filter(|((q, _), _)| q.is_nan()).for_each(|((q, m), d)| *q = m - d);
+            }
+            if !keep("truth_jpos", holes, &mut self.mask) {
+                self.truth = None;
+            }
+        }
+        for set in [&mut self.command, &mut self.motor].into_iter().flatten() {
+            for series in set {
+                let _ = bridged(series, dt_s, HOLE_S);
+            }
+        }
+    }
+
+    /// The same at other times: samples `dt_s` apart from `start_s` on, `count` of them, all within the run.
+    fn at(&self, start_s: f64, dt_s: f64, count: usize) -> Self {
+        let first = (start_s - self.start_s) / self.dt_s;
+        let step = dt_s / self.dt_s;
+        let last = self.len() - 1;
+        let places: Vec<(usize, f64)> = (0..count)
+            .map(|i| {
+                let at = (first + i as f64 * step).clamp(0.0, last as f64);
+                // On a sample but for rounding.
+                let at = if (at - at.round()).abs() < 1e-3 { at.round() } else { at };
+                (at as usize, at.fract())
+            })
+            .collect();
+        let value = |s: &[f64], (k, share): (usize, f64)| {
+            let next = s[(k + 1).min(last)];
+            let between = if share == 0.0 { s[k] } else { s[k] + share * (next - s[k]) };
+            if between.is_finite() || share == 0.0 {
+                between
+            } else if share < 0.5 {
+                s[k]
+            } else {
+                next
+            }
+        };
+        let series = |s: &Vec<f64>| places.iter().map(|place| value(s, *place)).collect::<Vec<f64>>();
+        let set = |set: &Vec<Vec<f64>>| set.iter().map(series).collect::<Vec<_>>();
+        Self {
+            id: self.id.clone(),
+            start_s,
+            dt_s,
+            position: set(&self.position),
+            torque: self.torque.as_ref().map(set),
+            truth: self.truth.as_ref().map(set),
+            command: self.command.as_ref().map(set),
+            motor: self.motor.as_ref().map(set),
+            tip: self.tip.as_ref().map(|tip| tip.each_ref().map(series)),
+            mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
+            left_out: self.left_out.clone(),
+        }
     }
 
     /// The samples from `from` up to `to`.
@@ -154,24 +361,85 @@ impl Run {
             command: self.command.as_ref().map(cut),
             motor: self.motor.as_ref().map(cut),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
+            mask: self.mask[from..to].to_vec(),
+            left_out: self.left_out.clone(),
         }
     }
 }
 
-/// The common stretch of a recording and its simulation, sample for sample.
+/// Is every value that is there the same?
+fn constant(series: &[f64]) -> bool {
+    let mut values = series.iter().filter(|x| x.is_finite());
+    values.next().is_none_or(|first| values.all(|x| x == first))
+}
+
+fn mark(mask: &mut [bool], holes: &[bool]) {
+    mask.iter_mut().zip(holes).for_each(|(mask, hole)| *mask |= hole);
+}
+
+/// Draws a line over each stretch of NaN, holds the ends; true where a stretch is longer than `hole_s`. A single sample never
+/// is, but at the ends.
+pub(crate) fn bridged(series: &mut [f64], dt_s: f64, hole_s: f64) -> Vec<bool> {
+    let mut holes = vec![false; series.len()];
+    let mut i = 0;
+    while i < series.len() {
+        if series[i].is_finite() {
+            i += 1;
+            continue;
+        }
+        let end = series[i..].iter().position(|x| x.is_finite()).map_or(series.len(), |k| i + k);
+        let (before, after) = (i.checked_sub(1).map(|k| series[k]), series.get(end).copied());
+        let count = end - i;
+        let long = before.is_none() || after.is_none() || (count > 1 && count as f64 * dt_s > hole_s);
+        for k in i..end {
+            holes[k] = long;
+            series[k] = match (before, after) {
+                (Some(a), Some(b)) => a + (b - a) * (k + 1 - i) as f64 / (count + 1) as f64,
+                (Some(held), None) | (None, Some(held)) => held,
+                (None, None) => 0.0,
+            };
+        }
+        i = end;
+    }
+    holes
+}
+
+/// Refuses a recording of a robot whose joints turn where this one's slide.
+fn same_kinds(run: &str, recording: &Recording, robot: &Robot) -> Result<(), RunError> {
+    for (j, prismatic) in robot.prismatic.iter().enumerate() {
+        let (own, other, moves) = if *prismatic { ("m", "rad", "slides") } else { ("rad", "m", "turns") };
+        for quantity in ["jpos", "jpos_d", "truth_jpos", "q"] {
+            let name = |unit: &str| format!("{quantity}_{}_{unit}", j + 1);
+            if recording.column(&name(other)).is_some() && recording.column(&name(own)).is_none() {
+                let (run, robot) = (run.to_owned(), robot.name.clone());
+                return Err(RunError::OtherJoint { run, column: name(other), joint: j + 1, robot, moves });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.
 ///
 /// # Errors
 /// [`RunError::NoOverlap`].
 pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
-    let start = real.start_s.max(sim.start_s);
-    let end = real.time_s(real.len() - 1).min(sim.time_s(sim.len() - 1));
-    let count = ((end - start) / real.dt_s + 1.5).floor();
-    if count < 2.0 || (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s {
-        return Err(RunError::NoOverlap { run: real.id.clone() });
+    let end_s = |run: &Run| run.time_s(run.len() - 1);
+    let end = end_s(real).min(end_s(sim));
+    // The recording's first sample that the simulation has too.
+    let first = ((sim.start_s - real.start_s) / real.dt_s - 1e-3).ceil().max(0.0);
+    let start = real.start_s + first * real.dt_s;
+    let count = ((end - start) / real.dt_s + 1.0 + 1e-3).floor();
+    if count < 2.0 || first as usize >= real.len() {
+        let span = |run: &Run| format!("{:.3} to {:.3} s", run.start_s, end_s(run));
+        return Err(RunError::NoOverlap { run: real.id.clone(), run_s: span(real), sim: sim.id.clone(), sim_s: span(sim) });
     }
-    let first = |run: &Run| ((start - run.start_s) / run.dt_s).round() as usize;
-    let count = (count as usize).min(real.len() - first(real)).min(sim.len() - first(sim));
-    Ok((real.slice(first(real), first(real) + count), sim.slice(first(sim), first(sim) + count)))
+    let first = first as usize;
+    let count = (count as usize).min(real.len() - first);
+    let (mut real, mut sim) = (real.slice(first, first + count), sim.at(start, real.dt_s, count));
+    mark(&mut real.mask, &sim.mask);
+    sim.mask.clone_from(&real.mask);
+    Ok((real, sim))
 }
 
 /// Rows of a matrix times a set of series.
@@ -200,17 +468,42 @@ struct Clock {
 }
 
 impl Clock {
+    /// A clock for these times, which have to be fit for one.
+    fn of(run: &str, time: &[f64]) -> Result<Self, RunError> {
+        if time.len() < 2 {
+            return Err(RunError::Rows { run: run.to_owned(), rows: time.len() });
+        }
+        let wrong = |row: usize, what: String| Err(RunError::Time { run: run.to_owned(), row: row + 1, what });
+        if let Some(row) = time.iter().position(|t| !t.is_finite()) {
+            return wrong(row, "has no time; remove the row".to_owned());
+        }
+        if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            let (before, now) = (time[k], time[k + 1]);
+            return wrong(k + 1, format!("time {now} s does not rise above {before} s; sort the rows and drop repeated times"));
+        }
+        let clock = Self::new(time);
+        if clock.count as f64 > SPREAD * time.len() as f64 {
+            let widest = time.windows(2).enumerate().max_by(|a, b| (a.1[1] - a.1[0]).total_cmp(&(b.1[1] - b.1[0])));
+            let k = widest.map_or(0, |(k, _)| k);
+            let (before, now) = (time[k], time[k + 1]);
+            return wrong(k + 1, format!("time jumps from {before} s to {now} s; make two runs of the recording"));
+        }
+        Ok(clock)
+    }
+
     fn new(time: &[f64]) -> Self {
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         let dt_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
         let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
         let count = (span / dt_s).round() as usize + 1;
-        let uniform = count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
+        let uniform =
+            count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
         Self { start_s, dt_s, count, uniform }
     }
 
-    /// Linear between samples; a sample next to an empty cell stays empty.
+    /// Linear between rows that follow one another; where rows were lost, NaN. Beside an empty cell, the nearer row within half
+    /// a period: a camera's frames stay what they are.
     fn resample(&self, time: &[f64], values: &[f64]) -> Vec<f64> {
         if self.uniform {
             return values.to_vec();
@@ -222,9 +515,115 @@ impl Clock {
                 while k + 2 < time.len() && time[k + 1] < t {
                     k += 1;
                 }
-                let share = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
-                values[k] + share * (values[k + 1] - values[k])
+                let (step, share) = (time[k + 1] - time[k], ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0));
+                let between = values[k] + share * (values[k + 1] - values[k]);
+                if between.is_finite() && step <= 1.75 * self.dt_s {
+                    return between;
+                }
+                let near = if share < 0.5 { k } else { k + 1 };
+                if (time[near] - t).abs() <= 0.5 * self.dt_s { values[near] } else { f64::NAN }
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recordings::Column;
+    use simulator::model::RobotModel;
+
+    fn robot() -> Robot {
+        Robot::of(&RobotModel::load("raven2-nominal").expect("it ships"))
+    }
+
+    /// Three motors that turn evenly, a tip every 20 ms, and whatever else; rows at the times given.
+    fn recording(time: &[f64], more: Vec<Column>) -> Recording {
+        let motor = |j: usize| Column::new(format!("mpos_{j}_rad"), time.iter().map(|t| j as f64 * t).collect());
+        let frame = |t: f64| (t / 0.02 - (t / 0.02).round()).abs() < 1e-6;
+        let tip = |axis: &str| {
+            Column::new(format!("truth_{axis}_m"), time.iter().map(|t| if frame(*t) { *t } else { f64::NAN }).collect())
+        };
+        let mut columns = vec![Column::new("t_s", time.to_vec())];
+        columns.extend((1..=3).map(motor));
+        columns.extend(["x", "y", "z"].map(tip));
+        columns.extend(more);
+        Recording { name: "made up".to_owned(), columns, ..Recording::default() }
+    }
+
+    fn even(count: usize, dt_s: f64) -> Vec<f64> {
+        (0..count).map(|i| i as f64 * dt_s).collect()
+    }
+
+    #[test]
+    fn lines_bridge_holes_and_long_ones_are_marked() {
+        let none = f64::NAN;
+        let mut series = [none, 1.0, none, 3.0, none, none, none, 7.0, none];
+        let holes = bridged(&mut series, 0.001, 0.002);
+        assert_eq!(series, [1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 7.0]);
+        assert_eq!(holes, [true, false, false, false, true, true, true, false, true]);
+        assert_eq!(bridged(&mut [none, none], 0.001, 1.0), [true, true]);
+    }
+
+    #[test]
+    fn lost_rows_are_marked_and_cost_no_frame_of_the_camera() {
+        let whole = even(1000, 0.001);
+        let lost: Vec<f64> =
+            whole.iter().copied().enumerate().filter(|(i, _)| *i != 333 && !(500..=600).contains(i)).map(|(_, t)| t).collect();
+        let run = Run::new(&recording(&lost, Vec::new()), &robot()).expect("a run");
+        assert_eq!(run.len(), 1000);
+        assert!(run.position.iter().flatten().all(|q| q.is_finite()));
+        // One row is bridged, a tenth of a second is not believed.
+        assert_eq!(run.mask.iter().filter(|masked| **masked).count(), 101);
+        assert!(run.mask[500] && run.mask[600] && !run.mask[333] && !run.mask[499] && !run.mask[601]);
+        let frames: Vec<usize> = (0..1000).filter(|i| run.tip.as_ref().is_some_and(|tip| tip[0][*i].is_finite())).collect();
+        let recorded: Vec<usize> = (0..1000).step_by(20).filter(|i| !(500..=600).contains(i)).collect();
+        assert_eq!(frames, recorded);
+    }
+
+    #[test]
+    fn joint_encoders_that_come_seldom_are_bridged_by_the_motor() {
+        let time = even(1000, 0.001);
+        let inverse = robot().motor_from_joint.try_inverse().expect("regular");
+        let truth =
+            |j: usize, t: f64| (0..3).map(|k| inverse[(j, k)] * (k + 1) as f64 * t).sum::<f64>() + robot().drives[j].offset - 1e-3;
+        let column = |j: usize| {
+            let unit = if j == 2 { "m" } else { "rad" };
+            let cell = |(i, t): (usize, &f64)| if i % 20 == 0 || i == 999 { truth(j, *t) } else { f64::NAN };
+            Column::new(format!("truth_jpos_{}_{unit}", j + 1), time.iter().enumerate().map(cell).collect())
+        };
+        let run = Run::new(&recording(&time, (0..3).map(column).collect()), &robot()).expect("a run");
+        assert!(run.mask.iter().all(|masked| !masked));
+        for (j, series) in run.truth.expect("encoders").iter().enumerate() {
+            series.iter().zip(&time).for_each(|(q, t)| assert!((q - truth(j, *t)).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn a_simulation_of_another_rate_and_start_comes_to_the_recordings_clock() {
+        let robot = robot();
+        let run = |time: &[f64]| Run::new(&recording(time, Vec::new()), &robot).expect("a run");
+        let later: Vec<f64> = even(300, 0.0025).iter().map(|t| t + 0.1004).collect();
+        let (real, sim) = common(&run(&even(1000, 0.001)), &run(&later)).expect("overlap");
+        assert_eq!((real.len(), sim.len()), (747, 747));
+        assert!((real.start_s - 0.101).abs() < 1e-9 && (sim.start_s - real.start_s).abs() < 1e-12);
+        for (a, b) in real.position.iter().zip(&sim.position) {
+            a.iter().zip(b).for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{a} {b}"));
+        }
+        let apart: Vec<f64> = even(100, 0.001).iter().map(|t| t + 5.0).collect();
+        let error = common(&run(&even(1000, 0.001)), &run(&apart)).expect_err("no overlap").to_string();
+        assert!(error.contains("5.000 to 5.099 s") && error.contains("0.000 to 0.999 s"), "{error}");
+    }
+
+    #[test]
+    fn times_that_cannot_be_a_clock_are_refused_with_the_row() {
+        let refusal = |time: &[f64]| Run::new(&recording(time, Vec::new()), &robot()).expect_err("refused").to_string();
+        assert!(refusal(&[0.0, 0.001, 0.001, 0.002]).contains("row 3 after the header: time 0.001 s does not rise"));
+        assert!(refusal(&[0.0, 0.001, f64::NAN]).contains("row 3"));
+        assert!(refusal(&[0.0]).contains("has 1 rows"));
+        assert!(refusal(&[]).contains("has 0 rows"));
+        let mut jump = even(1000, 0.001);
+        jump[999] = 1e12;
+        assert!(refusal(&jump).contains("time jumps from 0.998 s to 1000000000000 s"));
     }
 }

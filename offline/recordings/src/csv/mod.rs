@@ -38,6 +38,19 @@ pub fn read(path: &Path) -> Result<Recording, CsvError> {
     }
 }
 
+/// As [`read`], for those who can leave rows out: any cell but the time's may be empty, which is NaN, and columns of unknown
+/// quantities may hold words, which are NaN too.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_gaps(path: &Path) -> Result<Recording, CsvError> {
+    let name = path.display().to_string();
+    match Input::open(path) {
+        Ok(input) => Reader { gaps: true, ..Reader::new(&name, input) }.recording(),
+        Err(problem) => Err(CsvError { file: name, line: None, column: None, problem: Box::new(of_input(&problem)) }),
+    }
+}
+
 /// Reads tidy CSV text; `name` stands for the file in messages.
 ///
 /// # Errors
@@ -76,11 +89,13 @@ fn check_names(names: &[&str]) -> Result<(), CsvProblem> {
 struct Reader<'a> {
     file: &'a str,
     lines: Lines,
+    /// See [`read_with_gaps`].
+    gaps: bool,
 }
 
 impl<'a> Reader<'a> {
     fn new(file: &'a str, input: Input) -> Self {
-        Self { file, lines: Lines::new(input) }
+        Self { file, lines: Lines::new(input), gaps: false }
     }
 
     fn recording(mut self) -> Result<Recording, CsvError> {
@@ -151,7 +166,7 @@ impl<'a> Reader<'a> {
                 return Err(self.here(CsvProblem::Ragged { expected: fields.len(), found }));
             }
             for (i, text) in text.split(',').enumerate() {
-                let value = number(cell(text), &fields[i]).map_err(|problem| self.at(i, names[i], problem))?;
+                let value = number(cell(text), &fields[i], self.gaps).map_err(|problem| self.at(i, names[i], problem))?;
                 values[i].push(value);
             }
             if is_run
@@ -202,12 +217,13 @@ fn cell(text: &str) -> &str {
     text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).map_or(text, str::trim)
 }
 
-fn number(text: &str, field: &Field) -> Result<f64, CsvProblem> {
+fn number(text: &str, field: &Field, gaps: bool) -> Result<f64, CsvProblem> {
     if text.is_empty() {
-        return if field.truth { Ok(f64::NAN) } else { Err(CsvProblem::EmptyCell) };
+        return if field.truth || (gaps && field.name != "t_s") { Ok(f64::NAN) } else { Err(CsvProblem::EmptyCell) };
     }
     match text::number(text.as_bytes()) {
         Some(value) if value.is_finite() => Ok((field.to_si)(value)),
+        None if gaps && !field.known => Ok(f64::NAN),
         Some(_) => Err(CsvProblem::NotFinite { text: text.to_owned() }),
         None => Err(CsvProblem::NotNumber { text: text.to_owned() }),
     }

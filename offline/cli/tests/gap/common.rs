@@ -1,0 +1,168 @@
+//! Running the program, reading what it leaves, and data to run it on.
+
+use gap_report::{Report, Role, Status, Verdict, check};
+use generator::order::{Order, Sealed, Wanted};
+use simulator::RobotModel;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+pub(crate) fn ravenpose(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ravenpose")).args(arguments).output().expect("ravenpose runs")
+}
+
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+/// What the program says when it goes wrong.
+pub(crate) fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A folder of our own, gone at the end.
+pub(crate) struct Folder(PathBuf);
+
+impl Folder {
+    pub(crate) fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("ravenpose-gap-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).expect("folder");
+        Self(path)
+    }
+
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        std::fs::write(self.file(name), bytes).expect("file");
+        self.file(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Runs of one robot.
+pub(crate) struct Case {
+    pub(crate) robot: PathBuf,
+    pub(crate) real: Vec<PathBuf>,
+    pub(crate) sim: Vec<PathBuf>,
+}
+
+impl Case {
+    /// Analyses it into a folder.
+    pub(crate) fn gap(&self, out: &Path) -> Output {
+        self.gap_with(out, &[])
+    }
+
+    pub(crate) fn gap_with(&self, out: &Path, more: &[&str]) -> Output {
+        let mut arguments = vec!["gap", "--real"];
+        arguments.extend(self.real.iter().map(|path| text(path)));
+        if !self.sim.is_empty() {
+            arguments.push("--sim");
+            arguments.extend(self.sim.iter().map(|path| text(path)));
+        }
+        arguments.extend(["--robot", text(&self.robot), "--out", text(out)]);
+        arguments.extend(more);
+        ravenpose(&arguments)
+    }
+}
+
+/// A case of the generator, written into a folder, with its truth. Labels and seeds are those of these tests alone.
+pub(crate) fn made(folder: &Folder, label: &str, effects: &[Wanted], seconds: f64) -> (Case, Vec<Sealed>) {
+    let order = Order { seed: 77, label: format!("cli/{label}"), effects: effects.to_vec(), seconds, runs: 2, ..Order::default() };
+    let case = order.make().expect("a case");
+    let files: BTreeMap<String, PathBuf> =
+        case.files.into_iter().map(|(name, bytes)| (name.clone(), folder.write(&name, bytes))).collect();
+    let runs = |start: &str| files.iter().filter(|(name, _)| name.starts_with(start)).map(|(_, path)| path.clone()).collect();
+    (Case { robot: files["robot.urdf"].clone(), real: runs("real_"), sim: runs("sim_") }, case.truth.effects)
+}
+
+/// The lines of a table, gzip or not, without metadata.
+pub(crate) fn lines(path: &Path) -> Vec<String> {
+    let folder = Folder::new(&format!("lines-{}", path.to_string_lossy().replace(['/', '.'], "-")));
+    let plain = folder.file("plain.csv");
+    let done = ravenpose(&["convert", text(path), text(&plain)]);
+    assert!(done.status.success(), "{}", errors(&done));
+    let table = std::fs::read_to_string(plain).expect("table");
+    table.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+}
+
+/// The report of a folder, after every promise about its files was looked at.
+pub(crate) fn report(out: &Path, output: &Output) -> Report {
+    let json = std::fs::read_to_string(out.join("report.json")).unwrap_or_else(|error| panic!("{error}: {}", errors(output)));
+    let report: Report = serde_json::from_str(&json).expect("a report");
+    assert_eq!(check(&report), [String::new(); 0]);
+    assert_eq!(violations(&json), [String::new(); 0]);
+    let wanted = match report.status {
+        Status::NoMismatch => 0,
+        Status::InsufficientData => 2,
+        _ => 1,
+    };
+    assert_eq!(output.status.code(), Some(wanted), "{:?}", report.status);
+    assert!(errors(output).is_empty(), "{}", errors(output));
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(words.contains("report.html"), "{words}");
+    alone(&std::fs::read_to_string(out.join("report.html")).expect("page"));
+    let corrected = out.join("corrected.toml");
+    assert_eq!(report.corrected_model.is_some(), corrected.exists());
+    if corrected.exists() {
+        let model = RobotModel::load(text(&corrected)).expect("corrected.toml is a robot");
+        assert!(model.name().ends_with("corrected"), "{}", model.name());
+    }
+    report
+}
+
+/// Violations of the schema that ships.
+fn violations(json: &str) -> Vec<String> {
+    let schema = include_str!("../../../../models/gap-report.schema.json");
+    let schema: serde_json::Value = serde_json::from_str(schema).expect("the schema is JSON");
+    let validator = jsonschema::options().should_validate_formats(true).build(&schema).expect("the schema is a schema");
+    let report = serde_json::from_str(json).expect("JSON");
+    validator.iter_errors(&report).map(|error| format!("{}: {error}", error.instance_path)).collect()
+}
+
+/// A page needs nothing from elsewhere: no script, no address, no file.
+fn alone(page: &str) {
+    assert!(page.contains("<svg") || page.contains("<html"), "{} bytes", page.len());
+    for mark in ["<script src", "<link", "<iframe", "@import", "url(", "src=\"http", "href=\"http", "<img src=\"/"] {
+        assert!(!page.contains(mark), "{mark}");
+    }
+    let addresses = page.replace("http://www.w3.org/", "");
+    assert!(!addresses.contains("://"), "an address in the page");
+}
+
+/// Primary verdicts, first first.
+pub(crate) fn primary(report: &Report) -> Vec<&Verdict> {
+    report.verdicts.iter().filter(|verdict| verdict.role == Role::Primary).collect()
+}
+
+/// Value and interval of a parameter.
+pub(crate) fn parameter(verdict: &Verdict, name: &str) -> (f64, [f64; 2]) {
+    let parameter = verdict.parameters.iter().find(|parameter| parameter.name == name);
+    let parameter = parameter.unwrap_or_else(|| panic!("{name} is not among {:?}", verdict.parameters));
+    (parameter.value, parameter.ci95)
+}
+
+/// The interval holds the truth, and the value is within a share of it.
+pub(crate) fn holds(verdict: &Verdict, name: &str, truth: f64, share: f64) {
+    let (value, [low, high]) = parameter(verdict, name);
+    assert!((low..=high).contains(&truth), "{name}: {truth} is not within {low} to {high}");
+    assert!((value - truth).abs() <= share * truth.abs(), "{name}: {value} for {truth}");
+}
+
+/// One line on standard error, exit status 2, these words in it, and nothing under the folder.
+pub(crate) fn refused(output: &Output, out: &Path, words: &[&str]) {
+    let error = errors(output);
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    for word in words {
+        assert!(error.contains(word), "{word:?} is not in: {error}");
+    }
+    assert!(!out.exists(), "{} was written", out.display());
+}

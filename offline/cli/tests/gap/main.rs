@@ -1,0 +1,9 @@
+//! `ravenpose gap` as a user runs it: the four examples, cases made by the generator, bad input, gaps in the data.
+#![allow(missing_docs)]
+
+mod common;
+mod document;
+mod examples;
+mod gaps;
+mod made;
+mod refused;
