@@ -92,6 +92,8 @@ pub struct Found<'a> {
     pub ceiling: &'a flexible::Ceiling,
     /// Noise floor of each cell, fixed before the fit.
     pub floors: &'a [f64],
+    /// Likeliest values of what is known only roughly, per cell.
+    pub beside: &'a [Vec<f64>],
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
 }
@@ -151,6 +153,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
+    let problem = if sims.is_empty() { problem.believed_roughly() } else { problem };
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
@@ -171,6 +174,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
     let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
+    let held_problem = if sims.is_empty() { held_problem.believed_roughly() } else { held_problem };
+    let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
     let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
     let found = Found {
@@ -184,6 +189,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         estimates: &estimates,
         ceiling: &ceiling,
         floors: &floors,
+        beside: &beside,
         unmodelled,
     };
     progress("judging on what was held out");

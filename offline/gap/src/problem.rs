@@ -4,6 +4,7 @@ use arm::serial::Workspace;
 
 use crate::motion::Motion;
 use crate::nominal::{Evaluator, Load, Nominal, sign_series};
+use crate::nuisance::{Nuisance, believed};
 use crate::robot::Robot;
 
 /// A residual space (gap-design.md, section 2).
@@ -57,6 +58,8 @@ pub struct Problem<'a> {
     pub loads: Vec<Vec<Load>>,
     /// Does the tip residual start from measured joints?
     pub tip_from_truth: bool,
+    /// What is known only roughly, per cell.
+    pub nuisances: Vec<Nuisance>,
 }
 
 impl<'a> Problem<'a> {
@@ -80,6 +83,7 @@ impl<'a> Problem<'a> {
             block_count: 0,
             loads,
             tip_from_truth,
+            nuisances: Vec::new(),
         };
         if pairs.iter().all(|pair| pair.real.torque.is_some()) {
             (0..n).for_each(|j| problem.push_torque(j, &sim_loads));
@@ -91,7 +95,15 @@ impl<'a> Problem<'a> {
             problem.push_tip();
         }
         problem.lay_blocks(block_s);
+        problem.nuisances = vec![Nuisance::default(); problem.cells.len()];
         problem
+    }
+
+    /// The same, its model believed but roughly: no simulation has shown what it stands for.
+    #[must_use]
+    pub fn believed_roughly(mut self) -> Self {
+        self.nuisances = believed(&self);
+        self
     }
 
     fn push_torque(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {

@@ -199,6 +199,7 @@ impl Search<'_, '_> {
                     start += theta.len();
                     left.iter_mut().zip(own.effect(c, theta)).for_each(|(y, p)| *y -= p);
                 }
+                let left = self.problem.nuisances[c].without(&left);
                 let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
                 Noise::fit(&parts)
             })
