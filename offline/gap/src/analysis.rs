@@ -13,7 +13,7 @@ use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
-use crate::run::{Run, RunError, common};
+use crate::run::{Run, RunError, alike, common};
 use crate::search::{Answer, Thresholds, search};
 use crate::{corrected, flexible, verdicts};
 
@@ -118,13 +118,23 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let robot = Robot::of(model);
     progress("reading the runs");
     let mut runs = Vec::new();
+    // Simulations that move otherwise, or at another time, than the recording.
+    let mut apart: Vec<Run> = Vec::new();
     for one in given {
         let real = Run::new(&one.real, &robot)?;
         let sim = one.sim.as_ref().map(|(sim, _)| Run::new(sim, &robot)).transpose()?;
         runs.push(match sim {
             Some(sim) => {
-                let (real, sim) = common(&real, &sim)?;
-                (Run { id: one.id.clone(), ..real }, Some(sim))
+                if !alike(&real, &sim) {
+                    apart.push(sim.clone());
+                }
+                // Of another rate: another run of its own, which says what to believe, and no more.
+                if (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
+                    (Run { id: one.id.clone(), ..real }, None)
+                } else {
+                    let (real, sim) = common(&real, &sim)?;
+                    (Run { id: one.id.clone(), ..real }, Some(sim))
+                }
             }
             None => (Run { id: one.id.clone(), ..real }, None),
         });
@@ -132,6 +142,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let mut quality = gates::check(&robot, &runs);
     // A simulation with its input reversed says nothing of the robot: the robot's own numbers stand in for it.
     if quality.iter().any(|q| q.check == "input_sign" && q.level == Level::Fail && q.message.contains("simulation")) {
+        runs.iter_mut().for_each(|run| run.1 = None);
+        apart.clear();
+    }
+    // With torques of their own they say what to believe of the robot, but not sample by sample.
+    let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
+    if !apart.is_empty() {
         runs.iter_mut().for_each(|run| run.1 = None);
     }
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
@@ -149,7 +165,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let train: Vec<Pair> = train.iter().map(pair).collect();
     let held: Vec<Pair> = held.iter().map(pair).collect();
     progress("learning what the simulator believes");
-    let sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
+    let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
+    sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
     let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));

@@ -69,6 +69,7 @@ impl Nominal {
             return;
         }
         let start = Self::of(robot);
+        let coupling = robot.coupling();
         let mut gram = DMatrix::zeros(width, width);
         let mut right = DVector::zeros(width);
         let mut ws = Workspace::new(&robot.arm);
@@ -96,8 +97,11 @@ impl Nominal {
                     {
                         add(&mut gram, &mut right, &row[..links], deflection[j][i] / compliance, compliance / deflection_scale[j].max(1e-12));
                     }
-                    let drive = [state.acceleration[j], state.velocity[j], signs[j][i], 1.0];
-                    row[links + DRIVE_COLUMNS * j..][..DRIVE_COLUMNS].copy_from_slice(&drive);
+                    for d in (0..n).filter(|d| coupling[(*d, j)] != 0.0) {
+                        let drive = [run.drive_acceleration[d][i], run.drive_velocity[d][i], signs[d][i], 1.0];
+                        let carried = drive.map(|x| coupling[(d, j)] * x);
+                        row[links + DRIVE_COLUMNS * d..][..DRIVE_COLUMNS].copy_from_slice(&carried);
+                    }
                     add(&mut gram, &mut right, &row, torque[j][i], 1.0 / torque_scale[j].max(1e-12));
                 }
             }
@@ -135,6 +139,7 @@ impl Nominal {
     fn torque_left(&self, robot: &Robot, runs: &[Motion]) -> Vec<f64> {
         let mut evaluator = Evaluator::new(robot, self);
         let n = robot.joint_count();
+        let coupling = robot.coupling();
         let mut left = vec![Vec::new(); n];
         for run in runs {
             let Some(torque) = &run.torque else { continue };
@@ -142,7 +147,8 @@ impl Nominal {
             for &i in &run.rows {
                 let load = evaluator.load(run, i);
                 for j in 0..n {
-                    left[j].push(torque[j][i] - load.motor[j] - self.drives[j][2] * signs[j][i]);
+                    let friction: f64 = (0..n).map(|d| coupling[(d, j)] * self.drives[d][2] * signs[d][i]).sum();
+                    left[j].push(torque[j][i] - load.motor[j] - friction);
                 }
             }
         }
@@ -195,13 +201,14 @@ pub struct Evaluator<'a> {
     nominal: &'a Nominal,
     ws: Workspace,
     regressor: Vec<f64>,
+    coupling: DMatrix<f64>,
 }
 
 impl<'a> Evaluator<'a> {
     /// For a robot and what is believed of it.
     pub fn new(robot: &'a Robot, nominal: &'a Nominal) -> Self {
         let n = robot.joint_count();
-        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS] }
+        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS], coupling: robot.coupling() }
     }
 
     /// Torques of the links at a state; by the regressor, since learnt parameters need not be those of a possible body.
@@ -214,12 +221,14 @@ impl<'a> Evaluator<'a> {
     pub fn load(&mut self, run: &Motion, i: usize) -> Load {
         let state = run.link(i);
         let link = self.link(&state);
-        let motor = (0..link.len())
+        let n = link.len();
+        let of_drive: Vec<f64> = (0..n)
             .map(|j| {
                 let [rotor, viscous, _, constant] = self.nominal.drives[j];
-                link[j] + rotor * state.acceleration[j] + viscous * state.velocity[j] + constant
+                rotor * run.drive_acceleration[j][i] + viscous * run.drive_velocity[j][i] + constant
             })
             .collect();
+        let motor = (0..n).map(|j| link[j] + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
         Load { link, motor }
     }
 }

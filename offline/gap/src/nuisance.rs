@@ -129,7 +129,7 @@ pub fn believed(problem: &Problem) -> Vec<Nuisance> {
             for (k, column) in columns.iter_mut().enumerate() {
                 column[row] = y[j * links + k];
             }
-            acceleration.push(state.acceleration[j]);
+            acceleration.push(motion.drive_acceleration[j][i]);
             torque.push(motion.torque.as_ref().map_or(0.0, |t| t[j][i]));
         }
         let usual = rms(torque.into_iter());

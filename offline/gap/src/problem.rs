@@ -107,12 +107,17 @@ impl<'a> Problem<'a> {
     }
 
     fn push_torque(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
-        let coulomb = self.nominal.drives[j][2];
+        let coupling = self.robot.coupling();
+        let dry: Vec<(usize, f64)> = (0..self.robot.joint_count())
+            .map(|d| (d, coupling[(d, j)] * self.nominal.drives[d][2]))
+            .filter(|(_, coulomb)| *coulomb != 0.0)
+            .collect();
         let mut cell = Cell { channel: Channel::JointTorque, index: j, rows: Vec::new(), residual: Vec::new() };
         for (r, pair) in self.pairs.iter().enumerate() {
             let expected = |motion: &Motion, loads: &[Load]| -> Vec<f64> {
-                let sign = (coulomb != 0.0).then(|| sign_series(motion, j));
-                pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + sign.as_ref().map_or(0.0, |s| coulomb * s[i])).collect()
+                let signs: Vec<(f64, Vec<f64>)> = dry.iter().map(|(d, coulomb)| (*coulomb, sign_series(motion, *d))).collect();
+                let friction = |i: usize| signs.iter().map(|(coulomb, s)| coulomb * s[i]).sum::<f64>();
+                pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + friction(i)).collect()
             };
             let torque = &pair.real.torque.as_ref().expect("checked by the caller")[j];
             let mut residual: Vec<f64> =

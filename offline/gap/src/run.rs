@@ -53,6 +53,8 @@ pub struct Run {
     pub truth: Option<Vec<Vec<f64>>>,
     /// Commanded joint positions.
     pub command: Option<Vec<Vec<f64>>>,
+    /// Positions of the drives in joint units: joint positions and what the other joints' cables add.
+    pub drive: Vec<Vec<f64>>,
     /// Motor positions, rad.
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
@@ -131,6 +133,7 @@ impl Run {
             id: run,
             start_s: clock.start_s,
             dt_s: clock.dt_s,
+            drive: combine(&robot.coupling(), &position),
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
             truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
@@ -149,6 +152,7 @@ impl Run {
             start_s: self.time_s(from),
             dt_s: self.dt_s,
             position: cut(&self.position),
+            drive: cut(&self.drive),
             torque: self.torque.as_ref().map(cut),
             truth: self.truth.as_ref().map(cut),
             command: self.command.as_ref().map(cut),
@@ -156,6 +160,19 @@ impl Run {
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
         }
     }
+}
+
+/// Largest distance of two motions that count as one, of a joint's own spread (RMS).
+const APART: f64 = 0.25;
+
+/// Is one the same motion as the other at the same time, so that their torques may be compared sample by sample?
+pub fn alike(real: &Run, sim: &Run) -> bool {
+    let Ok((real, sim)) = common(real, sim) else { return false };
+    real.position.iter().zip(&sim.position).all(|(a, b)| {
+        let mean = crate::nominal::mean(a);
+        let spread = crate::nominal::rms(a.iter().map(|x| x - mean));
+        crate::nominal::rms(a.iter().zip(b).map(|(a, b)| a - b)) <= APART * spread.max(1e-4)
+    })
 }
 
 /// The common stretch of a recording and its simulation, sample for sample.

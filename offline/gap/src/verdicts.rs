@@ -143,7 +143,9 @@ pub(crate) fn outcome(
     report.verdicts = ranked(verdicts);
     report.corrected_model = artifact;
     report.remaining = remaining(found);
-    report.summary = gap_report::headlines(&report).join(" ");
+    // What has to be put right first stands first.
+    let first = report.quality(Level::Fail).filter(|q| q.check == "input_sign").map(gap_report::quality_headline);
+    report.summary = first.chain(gap_report::headlines(&report)).collect::<Vec<_>>().join(" ");
     Outcome { report, pictures: pictures::draw(found, runs), corrected }
 }
 
