@@ -13,7 +13,7 @@ use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
-use crate::run::{Run, RunError, common};
+use crate::run::{Run, RunError, alike, common};
 use crate::search::{Answer, Thresholds, search};
 use crate::{builtin, corrected, flexible, verdicts};
 
@@ -94,6 +94,8 @@ pub struct Found<'a> {
     pub ceiling: &'a flexible::Ceiling,
     /// Noise floor of each cell, fixed before the fit.
     pub floors: &'a [f64],
+    /// Likeliest values of what is known only roughly, per cell.
+    pub beside: &'a [Vec<f64>],
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
 }
@@ -120,6 +122,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let robot = Robot::of(model);
     progress("reading the runs");
     let mut runs = Vec::new();
+    // Simulations that move otherwise, or at another time, than the recording.
+    let mut apart: Vec<Run> = Vec::new();
     for one in given {
         let real = Run::new(&one.real, &robot)?;
         let sim = match &one.sim {
@@ -128,8 +132,16 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         };
         runs.push(match sim {
             Some(sim) => {
-                let (real, sim) = common(&real, &sim)?;
-                (Run { id: one.id.clone(), ..real }, Some(sim))
+                if !alike(&real, &sim) {
+                    apart.push(sim.clone());
+                }
+                // Of another rate: another run of its own, which says what to believe, and no more.
+                if (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
+                    (Run { id: one.id.clone(), ..real }, None)
+                } else {
+                    let (real, sim) = common(&real, &sim)?;
+                    (Run { id: one.id.clone(), ..real }, Some(sim))
+                }
             }
             None => (Run { id: one.id.clone(), ..real }, None),
         });
@@ -143,6 +155,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     }
     // A simulation with its input reversed says nothing of the robot: the robot's own numbers stand in for it.
     if quality.iter().any(|q| q.check == "input_sign" && q.level == Level::Fail && q.message.contains("simulation")) {
+        runs.iter_mut().for_each(|run| run.1 = None);
+        apart.clear();
+    }
+    // With torques of their own they say what to believe of the robot, but not sample by sample.
+    let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
+    if !apart.is_empty() {
         runs.iter_mut().for_each(|run| run.1 = None);
     }
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
@@ -165,10 +183,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
     }
     progress("learning what the simulator believes");
-    let sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
+    let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
+    sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
     let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
+    let problem = if sims.is_empty() { problem.believed_roughly() } else { problem };
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
@@ -189,6 +209,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
     let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
+    let held_problem = if sims.is_empty() { held_problem.believed_roughly() } else { held_problem };
+    let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
     let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
     let found = Found {
@@ -202,6 +224,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         estimates: &estimates,
         ceiling: &ceiling,
         floors: &floors,
+        beside: &beside,
         unmodelled,
     };
     progress("judging on what was held out");

@@ -6,6 +6,7 @@ pub mod intervals;
 pub mod linear;
 pub mod motion;
 pub mod nominal;
+pub mod nuisance;
 pub mod parameters;
 pub mod problem;
 pub mod robot;

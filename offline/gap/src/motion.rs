@@ -42,7 +42,11 @@ pub struct Motion {
     pub velocity: Vec<Vec<f64>>,
     /// Its acceleration.
     pub acceleration: Vec<Vec<f64>>,
-    /// Velocity, smoothed little: friction turns with it.
+    /// Velocity of the drives in joint units, smoothed.
+    pub drive_velocity: Vec<Vec<f64>>,
+    /// Its derivative.
+    pub drive_acceleration: Vec<Vec<f64>>,
+    /// Velocity of the drives, smoothed little: friction turns with it.
     pub quick_velocity: Vec<Vec<f64>>,
     /// Torque at the joints, smoothed.
     pub torque: Option<Vec<Vec<f64>>>,
@@ -92,7 +96,9 @@ impl Motion {
             position: smooth(&run.position, 0),
             velocity: smooth(&run.position, 1),
             acceleration: smooth(&run.position, 2),
-            quick_velocity: run.position.iter().map(|s| quick.apply(s, 1)).collect(),
+            drive_velocity: smooth(&run.drive, 1),
+            drive_acceleration: smooth(&run.drive, 2),
+            quick_velocity: run.drive.iter().map(|s| quick.apply(s, 1)).collect(),
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
             slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
             deflection: deflection.as_ref().map(|d| smooth(d, 0)),

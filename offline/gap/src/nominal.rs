@@ -11,7 +11,7 @@ use crate::robot::Robot;
 const DRIVE_COLUMNS: usize = 4;
 
 /// Rounds between torque and deflection.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 2;
 
 /// A nominal model.
 #[derive(Debug, Clone)]
@@ -56,12 +56,11 @@ impl Nominal {
     /// simulator's own deflection does, so both are fitted together, the compliance first from the robot's own weights.
     pub fn learn(robot: &Robot, runs: &[Motion]) -> Self {
         let mut nominal = Self::of(robot);
-        // The scale of the load comes from the torque alone, its finer shape from the deflection too.
-        nominal.compliance.fill([0.0; 2]);
         for _ in 0..ROUNDS {
-            nominal.learn_torque(robot, runs);
             nominal.learn_deflection(robot, runs);
+            nominal.learn_torque(robot, runs);
         }
+        nominal.learn_deflection(robot, runs);
         nominal
     }
 
@@ -73,6 +72,7 @@ impl Nominal {
             return;
         }
         let start = Self::of(robot);
+        let coupling = robot.coupling();
         let mut gram = DMatrix::zeros(width, width);
         let mut right = DVector::zeros(width);
         let mut ws = Workspace::new(&robot.arm);
@@ -100,8 +100,11 @@ impl Nominal {
                     {
                         add(&mut gram, &mut right, &row[..links], deflection[j][i] / compliance, compliance / deflection_scale[j].max(1e-12));
                     }
-                    let drive = [state.acceleration[j], state.velocity[j], signs[j][i], 1.0];
-                    row[links + DRIVE_COLUMNS * j..][..DRIVE_COLUMNS].copy_from_slice(&drive);
+                    for d in (0..n).filter(|d| coupling[(*d, j)] != 0.0) {
+                        let drive = [run.drive_acceleration[d][i], run.drive_velocity[d][i], signs[d][i], 1.0];
+                        let carried = drive.map(|x| coupling[(d, j)] * x);
+                        row[links + DRIVE_COLUMNS * d..][..DRIVE_COLUMNS].copy_from_slice(&carried);
+                    }
                     add(&mut gram, &mut right, &row, torque[j][i], 1.0 / torque_scale[j].max(1e-12));
                 }
             }
@@ -139,6 +142,7 @@ impl Nominal {
     fn torque_left(&self, robot: &Robot, runs: &[Motion]) -> Vec<f64> {
         let mut evaluator = Evaluator::new(robot, self);
         let n = robot.joint_count();
+        let coupling = robot.coupling();
         let mut left = vec![Vec::new(); n];
         for run in runs {
             let Some(torque) = &run.torque else { continue };
@@ -146,7 +150,8 @@ impl Nominal {
             for &i in &run.rows {
                 let load = evaluator.load(run, i);
                 for j in 0..n {
-                    left[j].push(torque[j][i] - load.motor[j] - self.drives[j][2] * signs[j][i]);
+                    let friction: f64 = (0..n).map(|d| coupling[(d, j)] * self.drives[d][2] * signs[d][i]).sum();
+                    left[j].push(torque[j][i] - load.motor[j] - friction);
                 }
             }
         }
@@ -199,13 +204,14 @@ pub struct Evaluator<'a> {
     nominal: &'a Nominal,
     ws: Workspace,
     regressor: Vec<f64>,
+    coupling: DMatrix<f64>,
 }
 
 impl<'a> Evaluator<'a> {
     /// For a robot and what is believed of it.
     pub fn new(robot: &'a Robot, nominal: &'a Nominal) -> Self {
         let n = robot.joint_count();
-        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS] }
+        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS], coupling: robot.coupling() }
     }
 
     /// Torques of the links at a state; by the regressor, since learnt parameters need not be those of a possible body.
@@ -218,12 +224,14 @@ impl<'a> Evaluator<'a> {
     pub fn load(&mut self, run: &Motion, i: usize) -> Load {
         let state = run.link(i);
         let link = self.link(&state);
-        let motor = (0..link.len())
+        let n = link.len();
+        let of_drive: Vec<f64> = (0..n)
             .map(|j| {
                 let [rotor, viscous, _, constant] = self.nominal.drives[j];
-                link[j] + rotor * state.acceleration[j] + viscous * state.velocity[j] + constant
+                rotor * run.drive_acceleration[j][i] + viscous * run.drive_velocity[j][i] + constant
             })
             .collect();
+        let motor = (0..n).map(|j| link[j] + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
         Load { link, motor }
     }
 }

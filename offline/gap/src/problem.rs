@@ -4,6 +4,7 @@ use arm::serial::Workspace;
 
 use crate::motion::Motion;
 use crate::nominal::{Evaluator, Load, Nominal, sign_series};
+use crate::nuisance::{Nuisance, believed};
 use crate::robot::Robot;
 
 /// A residual space (gap-design.md, section 2).
@@ -57,6 +58,8 @@ pub struct Problem<'a> {
     pub loads: Vec<Vec<Load>>,
     /// Does the tip residual start from measured joints?
     pub tip_from_truth: bool,
+    /// What is known only roughly, per cell.
+    pub nuisances: Vec<Nuisance>,
 }
 
 impl<'a> Problem<'a> {
@@ -80,6 +83,7 @@ impl<'a> Problem<'a> {
             block_count: 0,
             loads,
             tip_from_truth,
+            nuisances: Vec::new(),
         };
         if pairs.iter().all(|pair| pair.real.torque.is_some()) {
             (0..n).for_each(|j| problem.push_torque(j, &sim_loads));
@@ -91,16 +95,29 @@ impl<'a> Problem<'a> {
             problem.push_tip();
         }
         problem.lay_blocks(block_s);
+        problem.nuisances = vec![Nuisance::default(); problem.cells.len()];
         problem
     }
 
+    /// The same, its model believed but roughly: no simulation has shown what it stands for.
+    #[must_use]
+    pub fn believed_roughly(mut self) -> Self {
+        self.nuisances = believed(&self);
+        self
+    }
+
     fn push_torque(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
-        let coulomb = self.nominal.drives[j][2];
+        let coupling = self.robot.coupling();
+        let dry: Vec<(usize, f64)> = (0..self.robot.joint_count())
+            .map(|d| (d, coupling[(d, j)] * self.nominal.drives[d][2]))
+            .filter(|(_, coulomb)| *coulomb != 0.0)
+            .collect();
         let mut cell = Cell { channel: Channel::JointTorque, index: j, rows: Vec::new(), residual: Vec::new() };
         for (r, pair) in self.pairs.iter().enumerate() {
             let expected = |motion: &Motion, loads: &[Load]| -> Vec<f64> {
-                let sign = (coulomb != 0.0).then(|| sign_series(motion, j));
-                pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + sign.as_ref().map_or(0.0, |s| coulomb * s[i])).collect()
+                let signs: Vec<(f64, Vec<f64>)> = dry.iter().map(|(d, coulomb)| (*coulomb, sign_series(motion, *d))).collect();
+                let friction = |i: usize| signs.iter().map(|(coulomb, s)| coulomb * s[i]).sum::<f64>();
+                pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + friction(i)).collect()
             };
             let torque = &pair.real.torque.as_ref().expect("checked by the caller")[j];
             let mut residual: Vec<f64> =

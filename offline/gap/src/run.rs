@@ -124,6 +124,8 @@ pub struct Run {
     pub truth: Option<Vec<Vec<f64>>>,
     /// Commanded joint positions.
     pub command: Option<Vec<Vec<f64>>>,
+    /// Positions of the drives in joint units: joint positions and what the other joints' cables add.
+    pub drive: Vec<Vec<f64>>,
     /// Motor positions, rad.
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
@@ -226,6 +228,7 @@ impl Run {
             start_s: clock.start_s,
             dt_s: clock.dt_s,
             mask: vec![false; position[0].len()],
+            drive: combine(&robot.coupling(), &position),
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
             truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
@@ -267,7 +270,7 @@ impl Run {
     /// Draws lines over cells that are empty, and marks those that are too long to be believed.
     fn bridge(&mut self) {
         let dt_s = self.dt_s;
-        for series in &mut self.position {
+        for series in self.position.iter_mut().chain(&mut self.drive) {
             mark(&mut self.mask, &bridged(series, dt_s, HOLE_S));
         }
         let length = self.mask.len();
@@ -337,6 +340,7 @@ impl Run {
             start_s,
             dt_s,
             position: set(&self.position),
+            drive: set(&self.drive),
             torque: self.torque.as_ref().map(set),
             truth: self.truth.as_ref().map(set),
             command: self.command.as_ref().map(set),
@@ -356,6 +360,7 @@ impl Run {
             start_s: self.time_s(from),
             dt_s: self.dt_s,
             position: cut(&self.position),
+            drive: cut(&self.drive),
             torque: self.torque.as_ref().map(cut),
             truth: self.truth.as_ref().map(cut),
             command: self.command.as_ref().map(cut),
@@ -417,6 +422,19 @@ fn same_kinds(run: &str, recording: &Recording, robot: &Robot) -> Result<(), Run
         }
     }
     Ok(())
+}
+
+/// Largest distance of two motions that count as one, of a joint's own spread (RMS).
+const APART: f64 = 0.25;
+
+/// Is one the same motion as the other at the same time, so that their torques may be compared sample by sample?
+pub fn alike(real: &Run, sim: &Run) -> bool {
+    let Ok((real, sim)) = common(real, sim) else { return false };
+    real.position.iter().zip(&sim.position).all(|(a, b)| {
+        let mean = crate::nominal::mean(a);
+        let spread = crate::nominal::rms(a.iter().map(|x| x - mean));
+        crate::nominal::rms(a.iter().zip(b).map(|(a, b)| a - b)) <= APART * spread.max(1e-4)
+    })
 }
 
 /// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.

@@ -5,6 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::hypothesis::{Bound, Candidate, Column};
 use crate::linear;
 use crate::noise::{Noise, correlation_time};
+use crate::nominal::rms;
+use crate::nuisance::Projection;
 use crate::problem::Problem;
 
 /// Whitened parts of columns: for each, its cells.
@@ -14,6 +16,7 @@ type Parts = Vec<(usize, Vec<f64>)>;
 pub struct Scorer<'a> {
     problem: &'a Problem<'a>,
     noise: Vec<Noise>,
+    beside: Vec<Projection>,
     whitened: Vec<Vec<f64>>,
     /// Rows that count as one, per cell.
     pub correlation: Vec<f64>,
@@ -57,9 +60,16 @@ pub struct Gain {
 impl<'a> Scorer<'a> {
     /// With the noise of each cell.
     pub fn new(problem: &'a Problem<'a>, noise: Vec<Noise>) -> Self {
-        let whitened: Vec<Vec<f64>> = (0..problem.cells.len()).map(|c| whiten(problem, &noise[c], c, &problem.cells[c].residual)).collect();
+        let mut whitened: Vec<Vec<f64>> = (0..problem.cells.len()).map(|c| whiten(problem, &noise[c], c, &problem.cells[c].residual)).collect();
         let correlation = vec![1.0; whitened.len()];
-        Self { problem, noise, whitened, correlation }
+        let beside: Vec<Projection> = (0..whitened.len())
+            .map(|c| {
+                let columns: Vec<Vec<f64>> = problem.nuisances[c].columns.iter().map(|x| whiten(problem, &noise[c], c, x)).collect();
+                Projection::new(&columns, rms(whitened[c].iter().copied()))
+            })
+            .collect();
+        whitened.iter_mut().zip(&beside).for_each(|(y, beside)| beside.apply(y));
+        Self { problem, noise, beside, whitened, correlation }
     }
 
     /// Residual of a fit, whitened, per cell.
@@ -90,7 +100,12 @@ impl<'a> Scorer<'a> {
     }
 
     fn parts(&self, column: &Column) -> Parts {
-        column.parts.iter().map(|(c, values)| (*c, whiten(self.problem, &self.noise[*c], *c, values))).collect()
+        let whitened = |c: usize, values: &[f64]| {
+            let mut series = whiten(self.problem, &self.noise[c], c, values);
+            self.beside[c].apply(&mut series);
+            series
+        };
+        column.parts.iter().map(|(c, values)| (*c, whitened(*c, values))).collect()
     }
 
     /// Grams of nothing but the residual.

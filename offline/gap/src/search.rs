@@ -216,6 +216,7 @@ impl Search<'_, '_> {
                     start += theta.len();
                     left.iter_mut().zip(own.effect(c, theta)).for_each(|(y, p)| *y -= p);
                 }
+                let left = self.problem.nuisances[c].without(&left);
                 let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
                 Noise::fit(&parts)
             })
@@ -356,7 +357,7 @@ impl Search<'_, '_> {
 
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
-    candidate.family.penalty_nats + [0.0, 5.0, 15.0][candidate.edges().min(2)]
+    candidate.family.penalty_nats + [0.0, 8.0, 20.0][candidate.edges().min(2)]
 }
 
 /// Brings the simplest of those that are as good as the best to the front.

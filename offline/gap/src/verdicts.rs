@@ -13,7 +13,7 @@ use crate::hypothesis::Candidate;
 use crate::intervals::Estimate;
 use crate::nominal::rms;
 use crate::pictures;
-use crate::problem::{Cell, Channel};
+use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::Run;
 use crate::search::{Effect, Scored};
@@ -329,7 +329,24 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
         let predicted = there.effect(c, &estimate.coefficients);
         after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
     }
+    let nuisance = &found.held.nuisances[c];
+    if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
+        after.iter_mut().zip(nuisance.predict(&found.beside[cell])).for_each(|(y, p)| *y -= p);
+    }
     Some((c, before, after))
+}
+
+/// Likeliest values of what is known only roughly beside all effects, per cell.
+pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
+    (0..problem.cells.len())
+        .map(|c| {
+            let mut left = problem.cells[c].residual.clone();
+            for (effect, estimate) in effects.iter().zip(estimates) {
+                left.iter_mut().zip(effect.chosen.candidate.effect(c, &estimate.coefficients)).for_each(|(y, p)| *y -= p);
+            }
+            problem.nuisances[c].estimate(&left)
+        })
+        .collect()
 }
 
 /// Ids of the held-out runs.

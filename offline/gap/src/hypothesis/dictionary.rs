@@ -167,9 +167,15 @@ impl<'a> Dictionary<'a> {
         self.deflection(&all)
     }
 
-    /// A torque of one joint.
+    /// A torque of one joint; not at the link: of its drive, which its cables carry to the joints that they pass.
     pub fn effort_of(&self, joint: usize, series: Vec<f64>, at_link: bool) -> Column {
         let mut all = vec![None; self.joints()];
+        if !at_link {
+            let coupling = self.problem.robot.coupling();
+            for other in (0..self.joints()).filter(|other| *other != joint && coupling[(joint, *other)] != 0.0) {
+                all[other] = Some(series.iter().map(|x| coupling[(joint, other)] * x).collect());
+            }
+        }
         all[joint] = Some(series);
         self.effort(&all, at_link)
     }

@@ -37,7 +37,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: bool, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
     let travels = presliding(dictionary, j);
-    let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.velocity[j][i]);
+    let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.drive_velocity[j][i]);
     let speed = size(&velocity(dictionary)).max(1e-9);
     let by_load = move |d: &Dictionary, sign: &[f64]| {
         let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
