@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn rows_whose_window_touches_a_hole_are_left_out() {
-        let count = 2000;
+        let count = 2000_i32;
         let series: Vec<f64> = (0..count).map(|i| f64::from(i) * 1e-3).collect();
         let mut mask = vec![false; count as usize];
         mask[1000..1100].fill(true);
@@ -159,6 +159,7 @@ mod tests {
             start_s: 0.0,
             dt_s: 0.001,
             position: vec![series.clone()],
+            drive: vec![series.clone()],
             torque: None,
             truth: None,
             command: None,
