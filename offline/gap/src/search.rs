@@ -32,6 +32,9 @@ impl Default for Thresholds {
 
 /// Steps of the grid of windows in a run.
 const EDGES: usize = 12;
+/// What does not begin or end in a run: it is slow itself, or part of the machine.
+const ALWAYS: [&str; 6] =
+    ["thermal_drift", "cable_hysteresis", "torque_ripple", "pulley_eccentricity", "stribeck_friction", "load_dependent_friction"];
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
 
@@ -298,7 +301,7 @@ impl Search<'_, '_> {
         // Effects that begin or end on the way: the claims that do something, again, in windows.
         let begun: Vec<Candidate> = {
             let windows = self.windows();
-            let worth = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.gain.nats > 3.0);
+            let worth = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.gain.nats > 3.0 && !ALWAYS.contains(&s.candidate.family.physics));
             worth.flat_map(|s| windows.iter().map(move |w| (s.candidate.clone(), *w))).map(|(c, w)| c.within(self.problem, w)).filter(Candidate::shows).collect()
         };
         all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
@@ -353,7 +356,7 @@ impl Search<'_, '_> {
 
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
-    candidate.family.penalty_nats + 5.0 * candidate.edges() as f64
+    candidate.family.penalty_nats + [0.0, 5.0, 15.0][candidate.edges().min(2)]
 }
 
 /// Brings the simplest of those that are as good as the best to the front.
