@@ -148,7 +148,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     }
     let mut quality = gates::check(&robot, &runs);
     for one in given {
-        quality.extend(one.notes.iter().map(|note| DataQuality::new("damage", Level::Warn, note.clone()).run(one.id.clone())));
+        quality.extend(one.notes.iter().map(|note| DataQuality::new("file", Level::Warn, note.clone()).run(one.id.clone())));
     }
     if model.as_raven().is_none() {
         quality.extend(gates::beyond(&robot, &given[0].real, &given[0].id));

@@ -153,6 +153,13 @@ pub(crate) fn parameter(verdict: &Verdict, name: &str) -> (f64, [f64; 2]) {
 pub(crate) fn holds(verdict: &Verdict, name: &str, truth: f64, share: f64) {
     let (value, [low, high]) = parameter(verdict, name);
     assert!((low..=high).contains(&truth), "{name}: {truth} is not within {low} to {high}");
+    near(verdict, name, truth, share);
+    assert!(low < value && value < high, "{name}: {value}");
+}
+
+/// The value is within a share of the truth. Whether intervals hold truths is a matter of many cases: docs/proof.md.
+pub(crate) fn near(verdict: &Verdict, name: &str, truth: f64, share: f64) {
+    let (value, _) = parameter(verdict, name);
     assert!((value - truth).abs() <= share * truth.abs(), "{name}: {value} for {truth}");
 }
 

@@ -165,7 +165,7 @@ fn a_cut_recording_is_used_up_to_the_cut_and_the_report_says_so() {
     let out = folder.file("out");
     let output = ravenpose(&["gap", "--real", text(&cut), "--out", text(&out)]);
     let report = report(&out, &output);
-    let told = report.data_quality.iter().find(|quality| quality.check == "damage").expect("the damage is told");
+    let told = report.data_quality.iter().find(|quality| quality.check == "file").expect("the damage is told");
     assert!(told.message.contains("cut.mcap: byte "), "{}", told.message);
     assert!((15.0..25.0).contains(&report.inputs.runs[0].duration_s), "{} s", report.inputs.runs[0].duration_s);
 }
