@@ -13,13 +13,15 @@ fn main() {
     let folder = std::env::args().nth(1).expect("folder");
     let only = std::env::args().nth(2);
     let verbose = std::env::args().nth(3).is_some();
-    let mut cases: Vec<_> = std::fs::read_dir(Path::new(&folder).join("cases")).expect("cases").map(|e| e.expect("entry").path()).collect();
+    let mut cases: Vec<_> =
+        std::fs::read_dir(Path::new(&folder).join("cases")).expect("cases").map(|e| e.expect("entry").path()).collect();
     cases.sort();
     let mut lines = Vec::new();
     for case in cases {
         let id = case.file_name().expect("name").to_string_lossy().into_owned();
         let truth: serde_json::Value =
-            serde_json::from_str(&std::fs::read_to_string(Path::new(&folder).join(format!("sealed/{id}.json"))).expect("truth")).expect("json");
+            serde_json::from_str(&std::fs::read_to_string(Path::new(&folder).join(format!("sealed/{id}.json"))).expect("truth"))
+                .expect("json");
         let effects: Vec<(String, String)> = truth["effects"]
             .as_array()
             .expect("effects")
@@ -54,7 +56,11 @@ fn main() {
                         let m = &problem.pairs[r].real;
                         let d = m.deflection.as_ref().map_or(0.0, |d| d[j][i]);
                         let s = problem.pairs[r].sim.as_ref().and_then(|s| s.deflection.as_ref()).map_or(0.0, |d| d[j][i]);
-                        let _ = write!(text, " {:.6e} {:.6e} {:.6e} {:.6e} {:.6e}", problem.loads[r][k].link[j], d, s, m.position[j][i], m.velocity[j][i]);
+                        let _ = write!(
+                            text,
+                            " {:.6e} {:.6e} {:.6e} {:.6e} {:.6e}",
+                            problem.loads[r][k].link[j], d, s, m.position[j][i], m.velocity[j][i]
+                        );
                     }
                     text.push('\n');
                 }
@@ -64,7 +70,11 @@ fn main() {
                 println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::nominal::rms(cell.residual.iter().copied()));
             }
         }
-        let answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| if verbose { println!("{line}") });
+        let answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
+            if verbose {
+                println!("{line}")
+            }
+        });
         let found: Vec<String> = answer
             .effects
             .iter()
@@ -80,10 +90,29 @@ fn main() {
         };
         let mut line = String::new();
         let severity = truth["severity"].as_f64().unwrap_or(0.0);
-        let _ = write!(line, "{} {name:<24} j{} sev {severity:<5.1} {id}: {}", if right { "ok " } else { "BAD" }, effects.first().map_or("-", |e| &e.1), found.join(" + "));
+        let _ = write!(
+            line,
+            "{} {name:<24} j{} sev {severity:<5.1} {id}: {}",
+            if right { "ok " } else { "BAD" },
+            effects.first().map_or("-", |e| &e.1),
+            found.join(" + ")
+        );
         if let Some(effect) = answer.effects.first() {
-            let rivals = effect.rivals.iter().take(2).map(|r| format!("{}{:?} {:.0}", r.candidate.family.physics, r.candidate.family.joints.iter().map(|j| j + 1).collect::<Vec<_>>(), r.score));
-            let _ = write!(line, "  [{:.0} nats, share {:.2}; {}]", effect.chosen.score, effect.share, rivals.collect::<Vec<_>>().join(", "));
+            let rivals = effect.rivals.iter().take(2).map(|r| {
+                format!(
+                    "{}{:?} {:.0}",
+                    r.candidate.family.physics,
+                    r.candidate.family.joints.iter().map(|j| j + 1).collect::<Vec<_>>(),
+                    r.score
+                )
+            });
+            let _ = write!(
+                line,
+                "  [{:.0} nats, share {:.2}; {}]",
+                effect.chosen.score,
+                effect.share,
+                rivals.collect::<Vec<_>>().join(", ")
+            );
         } else if let Some(next) = &answer.next {
             let _ = write!(line, "  [next {}{:?} {:.1}]", next.candidate.family.physics, next.candidate.family.joints, next.score);
         }

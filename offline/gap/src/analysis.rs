@@ -54,7 +54,9 @@ pub enum AnalysisError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// No channel at all.
-    #[error("{run}: has neither torque nor joint or tip truth beside positions; record tau or dac, truth_jpos or truth_x, truth_y, truth_z")]
+    #[error(
+        "{run}: has neither torque nor joint or tip truth beside positions; record tau or dac, truth_jpos or truth_x, truth_y, truth_z"
+    )]
     NoChannel {
         /// The first run.
         run: String,
@@ -117,7 +119,12 @@ const REACH: f64 = 0.6;
 ///
 /// # Errors
 /// [`AnalysisError`] where there is nothing to compare; everything else ends in a report.
-pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Outcome, AnalysisError> {
+pub fn analyse(
+    model: &RobotModel,
+    given: &[Given],
+    options: &Options,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Outcome, AnalysisError> {
     let begun = Instant::now();
     let robot = Robot::of(model);
     progress("reading the runs");
@@ -174,7 +181,10 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
     }
     progress("smoothing");
-    let pair = |(real, sim): &(Run, Option<Run>)| Pair { real: Motion::new(real.clone(), band), sim: sim.clone().map(|sim| Motion::new(sim, band)) };
+    let pair = |(real, sim): &(Run, Option<Run>)| Pair {
+        real: Motion::new(real.clone(), band),
+        sim: sim.clone().map(|sim| Motion::new(sim, band)),
+    };
     let train: Vec<Pair> = train.iter().map(pair).collect();
     let held: Vec<Pair> = held.iter().map(pair).collect();
     let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
@@ -228,7 +238,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         unmodelled,
     };
     progress("judging on what was held out");
-    let corrected = (!answer.effects.is_empty()).then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
+    let corrected =
+        (!answer.effects.is_empty()).then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
     let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected);
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);
@@ -239,8 +250,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
 
 fn too_short(seconds: f64) -> DataQuality {
     let needed = SHORTEST_S / (1.0 - HELD_OUT);
-    DataQuality::new("too_short", Level::Fail, format!("{seconds:.1} s are left to fit on; record at least {needed:.0} s, better two runs of 30 s, all joints moving"))
-        .value(seconds, "s")
+    DataQuality::new(
+        "too_short",
+        Level::Fail,
+        format!("{seconds:.1} s are left to fit on; record at least {needed:.0} s, better two runs of 30 s, all joints moving"),
+    )
+    .value(seconds, "s")
 }
 
 fn too_few(seconds: f64) -> DataQuality {

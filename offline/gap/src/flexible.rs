@@ -61,10 +61,13 @@ fn features(dictionary: &Dictionary, cell: &Cell) -> Vec<(&'static str, Vec<f64>
     }
     all.push(("constant", vec![1.0; dictionary.grid.len()]));
     for (k, name) in [(1, "time"), (2, "time")] {
-        all.push((name, dictionary.at_grid(|r, i, _| {
-            let share = i as f64 / motion(r).run.len() as f64;
-            if k == 1 { share } else { share * share }
-        })));
+        all.push((
+            name,
+            dictionary.at_grid(|r, i, _| {
+                let share = i as f64 / motion(r).run.len() as f64;
+                if k == 1 { share } else { share * share }
+            }),
+        ));
     }
     all
 }
@@ -100,12 +103,23 @@ pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none
         }
     }
     let gain = scorer.gain(&library, &together);
-    let cell = by_cell.iter().enumerate().map(|(c, (nats, _))| (c, *nats)).max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, nats)| *nats > 0.0);
+    let cell = by_cell
+        .iter()
+        .enumerate()
+        .map(|(c, (nats, _))| (c, *nats))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, nats)| *nats > 0.0);
     let mut depends_on: Vec<&'static str> = cell.map_or_else(Vec::new, |(c, _)| by_cell[c].1.clone());
     depends_on.dedup();
     depends_on.truncate(3);
     let library_nats = scorer.gain(none, &library).nats;
-    Ceiling { library_nats, together_nats: library_nats + gain.nats.max(0.0), least_nats: gain.least.min(gain.nats), cell, depends_on }
+    Ceiling {
+        library_nats,
+        together_nats: library_nats + gain.nats.max(0.0),
+        least_nats: gain.least.min(gain.nats),
+        cell,
+        depends_on,
+    }
 }
 
 /// Features of one cell as columns.
@@ -117,5 +131,9 @@ fn cell_columns(dictionary: &Dictionary, c: usize) -> Vec<(&'static str, Column)
         column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
         column
     };
-    features(dictionary, cell).into_iter().map(|(name, series)| (name, column(series))).filter(|(_, column)| !column.is_empty()).collect()
+    features(dictionary, cell)
+        .into_iter()
+        .map(|(name, series)| (name, column(series)))
+        .filter(|(_, column)| !column.is_empty())
+        .collect()
 }

@@ -22,7 +22,12 @@ pub struct Estimate {
 /// for what is measured in units of the model's load, the weights that a lab gives its links (measured: docs/proof.md).
 fn common(physics: &str) -> f64 {
     match physics {
-        "cable_stretch" | "cable_creep" | "cable_hysteresis" | "load_dependent_friction" | "gravity_direction" | "motor_torque_scale" => 0.1,
+        "cable_stretch"
+        | "cable_creep"
+        | "cable_hysteresis"
+        | "load_dependent_friction"
+        | "gravity_direction"
+        | "motor_torque_scale" => 0.1,
         "payload" | "link_inertia" | "external_contact" => 0.06,
         _ => 0.015,
     }

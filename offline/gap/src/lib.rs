@@ -2,19 +2,19 @@
 #![deny(missing_docs)]
 
 pub mod filter;
+pub mod flexible;
+pub mod hypothesis;
 pub mod intervals;
 pub mod linear;
 pub mod motion;
+pub mod noise;
 pub mod nominal;
 pub mod nuisance;
 pub mod parameters;
 pub mod problem;
+pub mod refine;
 pub mod robot;
 pub mod run;
-pub mod flexible;
-pub mod hypothesis;
-pub mod noise;
-pub mod refine;
 pub mod score;
 pub mod search;
 

@@ -89,9 +89,11 @@ mod tests {
         let mut white = || {
             (0..12)
                 .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1_u64 << 53) as f64
-            }).sum::<f64>() - 6.0
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    (state >> 11) as f64 / (1_u64 << 53) as f64
+                })
+                .sum::<f64>()
+                - 6.0
         };
         let mut series = vec![0.0, 0.0];
         for k in 2..4000 {

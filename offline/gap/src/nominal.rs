@@ -79,10 +79,20 @@ impl Nominal {
         let mut y = vec![0.0; n * links];
         // Rows in units of what the model will leave: a few percent of the torque, noise of the deflection.
         let torque_scale: Vec<f64> = (0..n)
-            .map(|j| 0.05 * rms(runs.iter().filter_map(|run| run.torque.as_ref().map(|t| (run, t))).flat_map(|(run, t)| run.rows.iter().map(move |&i| t[j][i]))))
+            .map(|j| {
+                0.05 * rms(runs
+                    .iter()
+                    .filter_map(|run| run.torque.as_ref().map(|t| (run, t)))
+                    .flat_map(|(run, t)| run.rows.iter().map(move |&i| t[j][i])))
+            })
             .collect();
         let deflection_scale: Vec<f64> = (0..n)
-            .map(|j| 0.1 * rms(runs.iter().filter_map(|run| run.deflection.as_ref().map(|d| (run, d))).flat_map(|(run, d)| run.rows.iter().map(move |&i| d[j][i]))))
+            .map(|j| {
+                0.1 * rms(runs
+                    .iter()
+                    .filter_map(|run| run.deflection.as_ref().map(|d| (run, d)))
+                    .flat_map(|(run, d)| run.rows.iter().map(move |&i| d[j][i])))
+            })
             .collect();
         let mut row = vec![0.0; width];
         for run in runs {
@@ -98,7 +108,13 @@ impl Nominal {
                     if let Some(deflection) = &run.deflection
                         && compliance > 0.0
                     {
-                        add(&mut gram, &mut right, &row[..links], deflection[j][i] / compliance, compliance / deflection_scale[j].max(1e-12));
+                        add(
+                            &mut gram,
+                            &mut right,
+                            &row[..links],
+                            deflection[j][i] / compliance,
+                            compliance / deflection_scale[j].max(1e-12),
+                        );
                     }
                     for d in (0..n).filter(|d| coupling[(*d, j)] != 0.0) {
                         let drive = [run.drive_acceleration[d][i], run.drive_velocity[d][i], signs[d][i], 1.0];
@@ -211,7 +227,13 @@ impl<'a> Evaluator<'a> {
     /// For a robot and what is believed of it.
     pub fn new(robot: &'a Robot, nominal: &'a Nominal) -> Self {
         let n = robot.joint_count();
-        Self { robot, nominal, ws: Workspace::new(&robot.arm), regressor: vec![0.0; n * n * PARAMETERS], coupling: robot.coupling() }
+        Self {
+            robot,
+            nominal,
+            ws: Workspace::new(&robot.arm),
+            regressor: vec![0.0; n * n * PARAMETERS],
+            coupling: robot.coupling(),
+        }
     }
 
     /// Torques of the links at a state; by the regressor, since learnt parameters need not be those of a possible body.

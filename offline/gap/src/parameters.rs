@@ -48,7 +48,9 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         }
         ("payload", "anywhere on the last link") => {
             let mut all = vec![named("m_p", "kg", theta[0])];
-            all.extend(["c_x", "c_y", "c_z"].into_iter().zip(&theta[1..]).map(|(name, moment)| named(name, "m", moment / theta[0])));
+            all.extend(
+                ["c_x", "c_y", "c_z"].into_iter().zip(&theta[1..]).map(|(name, moment)| named(name, "m", moment / theta[0])),
+            );
             all
         }
         ("payload", _) => {

@@ -28,7 +28,12 @@ fn heat(found: &Found) -> Vec<HeatMap> {
     for (c, cell) in found.problem.cells.iter().enumerate() {
         let channel = told(cell.channel);
         if maps.last().is_none_or(|map| map.channel != channel) {
-            let runs = found.problem.pairs.iter().map(|pair| HeatRun { run: pair.real.run.id.clone(), start_s: pair.real.run.start_s, bin_s: BIN_S, values: Vec::new() });
+            let runs = found.problem.pairs.iter().map(|pair| HeatRun {
+                run: pair.real.run.id.clone(),
+                start_s: pair.real.run.start_s,
+                bin_s: BIN_S,
+                values: Vec::new(),
+            });
             maps.push(HeatMap { channel, rows: Vec::new(), runs: runs.collect() });
         }
         let Some(map) = maps.last_mut() else { continue };
@@ -41,7 +46,11 @@ fn heat(found: &Found) -> Vec<HeatMap> {
                 debug_assert_eq!(row_run, r);
                 each[((i as f64 * of.dt_s / BIN_S) as usize).min(bins - 1)].push(*y);
             }
-            run.values.push(each.into_iter().map(|bin| if bin.is_empty() { f64::NAN } else { rms(bin.into_iter()) / found.floors[c].max(1e-300) }).collect());
+            run.values.push(
+                each.into_iter()
+                    .map(|bin| if bin.is_empty() { f64::NAN } else { rms(bin.into_iter()) / found.floors[c].max(1e-300) })
+                    .collect(),
+            );
         }
     }
     maps
@@ -99,7 +108,10 @@ fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, 
         }
         "joint_coupling" => {
             let other = family.joints.get(1).copied().unwrap_or(joint);
-            (Quantity::new(format!("Position of {}", robot.joints[other]), robot.position_unit(other)), at(&|r, i| motion(r).position[other][i]))
+            (
+                Quantity::new(format!("Position of {}", robot.joints[other]), robot.position_unit(other)),
+                at(&|r, i| motion(r).position[other][i]),
+            )
         }
         "thermal_drift" | "cable_creep" => (Quantity::new("Time", "s"), at(&|r, i| motion(r).run.time_s(i))),
         _ => (Quantity::new(format!("Position of {name}"), unit), at(&|r, i| motion(r).position[joint][i])),

@@ -154,8 +154,8 @@ impl<'a> Problem<'a> {
     }
 
     fn push_tip(&mut self) {
-        let mut cells = [0, 1, 2]
-            .map(|axis| Cell { channel: Channel::EndEffector, index: axis, rows: Vec::new(), residual: Vec::new() });
+        let mut cells =
+            [0, 1, 2].map(|axis| Cell { channel: Channel::EndEffector, index: axis, rows: Vec::new(), residual: Vec::new() });
         let mut ws = Workspace::new(&self.robot.arm);
         for (r, pair) in self.pairs.iter().enumerate() {
             let tip = pair.real.run.tip.as_ref().expect("checked by the caller");

@@ -15,7 +15,8 @@ const ROUNDS: usize = 2;
 
 /// Every family at every point of its grid.
 pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidate> {
-    let points: Vec<(&Arc<Family>, &Vec<f64>)> = families.iter().flat_map(|family| family.grid.iter().map(move |shape| (family, shape))).collect();
+    let points: Vec<(&Arc<Family>, &Vec<f64>)> =
+        families.iter().flat_map(|family| family.grid.iter().map(move |shape| (family, shape))).collect();
     let make = |part: &[(&Arc<Family>, &Vec<f64>)]| -> Vec<Candidate> {
         part.iter().map(|(family, shape)| Candidate::new(dictionary, family, shape, None)).filter(Candidate::shows).collect()
     };
@@ -48,7 +49,8 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
     let rounds = if free.len() + best.edges() > 1 { ROUNDS } else { 1 };
     for _ in 0..rounds {
         for &k in &free {
-            let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
+            let mut step =
+                family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
             for _ in 0..HALVINGS {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
@@ -92,6 +94,7 @@ fn try_one(candidate: Candidate, best: &mut Candidate, least: &mut f64, misfit: 
 
 /// Distance to the nearest other value of the grid.
 fn spacing(family: &Family, k: usize, here: f64) -> f64 {
-    let nearest = family.grid.iter().map(|point| (point[k] - here).abs()).filter(|d| *d > 1e-12 * here.abs()).fold(f64::INFINITY, f64::min);
+    let nearest =
+        family.grid.iter().map(|point| (point[k] - here).abs()).filter(|d| *d > 1e-12 * here.abs()).fold(f64::INFINITY, f64::min);
     if nearest.is_finite() { nearest } else { 0.5 * here.abs().max(1e-6) }
 }

@@ -99,7 +99,11 @@ impl Robot {
     /// What each joint adds to the position that a drive sees, in the drive's own joint's units: `A` with ones on its diagonal.
     pub fn coupling(&self) -> DMatrix<f64> {
         let a = &self.motor_from_joint;
-        DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| if a[(i, i)] == 0.0 { f64::from(u8::from(i == j)) } else { a[(i, j)] / a[(i, i)] })
+        DMatrix::from_fn(
+            a.nrows(),
+            a.ncols(),
+            |i, j| if a[(i, i)] == 0.0 { f64::from(u8::from(i == j)) } else { a[(i, j)] / a[(i, i)] },
+        )
     }
 
     /// Number of joints.

@@ -60,11 +60,13 @@ pub struct Gain {
 impl<'a> Scorer<'a> {
     /// With the noise of each cell.
     pub fn new(problem: &'a Problem<'a>, noise: Vec<Noise>) -> Self {
-        let mut whitened: Vec<Vec<f64>> = (0..problem.cells.len()).map(|c| whiten(problem, &noise[c], c, &problem.cells[c].residual)).collect();
+        let mut whitened: Vec<Vec<f64>> =
+            (0..problem.cells.len()).map(|c| whiten(problem, &noise[c], c, &problem.cells[c].residual)).collect();
         let correlation = vec![1.0; whitened.len()];
         let beside: Vec<Projection> = (0..whitened.len())
             .map(|c| {
-                let columns: Vec<Vec<f64>> = problem.nuisances[c].columns.iter().map(|x| whiten(problem, &noise[c], c, x)).collect();
+                let columns: Vec<Vec<f64>> =
+                    problem.nuisances[c].columns.iter().map(|x| whiten(problem, &noise[c], c, x)).collect();
                 Projection::new(&columns, rms(whitened[c].iter().copied()))
             })
             .collect();
@@ -135,7 +137,15 @@ impl<'a> Scorer<'a> {
                 cell.iter()
                     .map(|g| {
                         DMatrix::from_fn(p + 1, p + 1, |i, j| {
-                            let place = |k: usize| if k < old { Some(k) } else if k == p { Some(old) } else { None };
+                            let place = |k: usize| {
+                                if k < old {
+                                    Some(k)
+                                } else if k == p {
+                                    Some(old)
+                                } else {
+                                    None
+                                }
+                            };
                             match (place(i), place(j)) {
                                 (Some(i), Some(j)) => g[(i, j)],
                                 _ => 0.0,
@@ -175,7 +185,8 @@ impl<'a> Scorer<'a> {
     pub fn fit(&self, grams: &Grams) -> Fit {
         let p = grams.columns;
         let cells = grams.sums.len();
-        let totals: Vec<DMatrix<f64>> = grams.sums.iter().map(|cell| cell.iter().fold(DMatrix::zeros(p + 1, p + 1), |a, b| a + b)).collect();
+        let totals: Vec<DMatrix<f64>> =
+            grams.sums.iter().map(|cell| cell.iter().fold(DMatrix::zeros(p + 1, p + 1), |a, b| a + b)).collect();
         let mut weights: Vec<f64> = (0..cells).map(|c| self.rows(c) / totals[c][(p, p)].max(1e-300)).collect();
         let mut coefficients = DVector::zeros(p);
         let mut normal = DMatrix::zeros(p, p);
@@ -235,7 +246,13 @@ impl<'a> Scorer<'a> {
             (0..base.held_out.len())
                 .map(|c| {
                     let sum = |fit: &Fit| -> f64 {
-                        fit.held_out[c].iter().enumerate().filter(|(b, _)| Some(*b) != skip).map(|(_, e)| e).sum::<f64>().max(1e-300)
+                        fit.held_out[c]
+                            .iter()
+                            .enumerate()
+                            .filter(|(b, _)| Some(*b) != skip)
+                            .map(|(_, e)| e)
+                            .sum::<f64>()
+                            .max(1e-300)
                     };
                     0.5 * self.rows(c) / self.correlation[c] * (sum(base) / sum(better)).ln()
                 })

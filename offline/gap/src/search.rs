@@ -119,7 +119,8 @@ pub fn search<'p>(
 ) -> Answer<'p> {
     let families = library(dictionary);
     let candidates: Vec<Candidate> = starts(dictionary, &families);
-    let mut search = Search { problem, dictionary, scorer: Scorer::new(problem, window_noise(problem)), candidates, thresholds: *thresholds };
+    let mut search =
+        Search { problem, dictionary, scorer: Scorer::new(problem, window_noise(problem)), candidates, thresholds: *thresholds };
     let none = search.scorer.fit(&search.scorer.empty());
     let mut chosen: Vec<Candidate> = Vec::new();
     let mut next = None;
@@ -151,9 +152,11 @@ pub fn search<'p>(
 
 impl Search<'_, '_> {
     fn grams(&self, chosen: &[Candidate], without: Option<usize>) -> Grams {
-        chosen.iter().enumerate().filter(|(k, _)| Some(*k) != without).fold(self.scorer.empty(), |grams, (_, candidate)| {
-            self.scorer.extended(&grams, &candidate.columns)
-        })
+        chosen
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| Some(*k) != without)
+            .fold(self.scorer.empty(), |grams, (_, candidate)| self.scorer.extended(&grams, &candidate.columns))
     }
 
     fn judged(&mut self, base: &Grams, others: &[Candidate], scored: &Scored) -> Judged {
@@ -258,7 +261,8 @@ impl Search<'_, '_> {
             effects.clear();
             // The last ones first: they explain what the first ones may explain as well, once refined alone.
             for k in (0..chosen.len()).rev() {
-                let mut others: Vec<Candidate> = chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+                let mut others: Vec<Candidate> =
+                    chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
                 if let [only] = others.as_mut_slice() {
                     *only = self.refined(&self.scorer.empty(), only);
                 } else {
@@ -302,8 +306,15 @@ impl Search<'_, '_> {
         // Effects that begin or end on the way: the claims that do something, again, in windows.
         let begun: Vec<Candidate> = {
             let windows = self.windows();
-            let worth = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.gain.nats > 3.0 && !ALWAYS.contains(&s.candidate.family.physics));
-            worth.flat_map(|s| windows.iter().map(move |w| (s.candidate.clone(), *w))).map(|(c, w)| c.within(self.problem, w)).filter(Candidate::shows).collect()
+            let worth = distinct(&all)
+                .into_iter()
+                .take(CLAIMS_IN_WINDOWS)
+                .filter(|s| s.gain.nats > 3.0 && !ALWAYS.contains(&s.candidate.family.physics));
+            worth
+                .flat_map(|s| windows.iter().map(move |w| (s.candidate.clone(), *w)))
+                .map(|(c, w)| c.within(self.problem, w))
+                .filter(Candidate::shows)
+                .collect()
         };
         all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
         sort(&mut all);
@@ -329,7 +340,8 @@ impl Search<'_, '_> {
             let scale = (self.scorer.gain(&base, &after).nats.max(0.0) / best.gain.nats).min(1.0);
             self.scorer.untempered();
             for scored in &mut claims {
-                scored.gain = Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
+                scored.gain =
+                    Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
                 scored.score = scored.gain.nats - price(&scored.candidate);
             }
         }
@@ -351,7 +363,12 @@ impl Search<'_, '_> {
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
         let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
         let gain = self.scorer.gain(base, &fit);
-        within_bounds(candidate, &fit).then(|| Scored { candidate: candidate.clone(), gain, score: gain.nats - price(candidate), coefficients })
+        within_bounds(candidate, &fit).then(|| Scored {
+            candidate: candidate.clone(),
+            gain,
+            score: gain.nats - price(candidate),
+            coefficients,
+        })
     }
 }
 

@@ -3,9 +3,10 @@
 use std::time::{Instant, SystemTime};
 
 use gap_report::{
-    Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature, Fit as FitFigure,
-    FloorMethod, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining, Report,
-    Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict, ranked, timestamp,
+    Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature,
+    Fit as FitFigure, FloorMethod, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures,
+    Regime, Remaining, Report, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing,
+    Tool, Verdict, ranked, timestamp,
 };
 
 use crate::analysis::{Found, Given, Options, Outcome};
@@ -240,11 +241,24 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let physics = physics(candidate);
     let location = location(found, candidate, estimate, effect.share);
     let fit = fits(found, candidate, &estimate.coefficients);
-    let score = Score { folds: Some(found.problem.block_count as u64), threshold_nats: Some(threshold), n_parameters: Some(estimate.parameters.len() as u64), ..Score::new(effect.gain.nats, effect.gain.error) };
+    let score = Score {
+        folds: Some(found.problem.block_count as u64),
+        threshold_nats: Some(threshold),
+        n_parameters: Some(estimate.parameters.len() as u64),
+        ..Score::new(effect.gain.nats, effect.gain.error)
+    };
     let claim = format!("explains {:.0} % of what is left where it shows most", 100.0 * effect.share);
-    let mut evidence = Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
+    let mut evidence =
+        Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
     evidence.effect = None;
-    let mut verdict = Verdict::primary(number, physics.clone(), probability, location.clone(), (told_parameters(found, candidate, estimate), fit, vec![evidence]), artifact);
+    let mut verdict = Verdict::primary(
+        number,
+        physics.clone(),
+        probability,
+        location.clone(),
+        (told_parameters(found, candidate, estimate), fit, vec![evidence]),
+        artifact,
+    );
     verdict.score = Some(score);
     if !close.is_empty() {
         let with: Vec<Confusable> = close
@@ -262,9 +276,24 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     }
     verdict.summary = Some(gap_report::headline(&verdict));
     let alternatives = effect.rivals.iter().take(3).filter(|r| weight(best, r.score) / total > 0.005).map(|rival| {
-        let place = Location::new(told(rival.candidate.family.channel), joints(found.robot, &rival.candidate), regime::subsystem(&rival.candidate), regime::regime(&rival.candidate));
-        let numbers = crate::parameters::parameters(found.robot, found.nominal, &rival.candidate, &rival.coefficients, &rival.candidate.shape);
-        let numbers = numbers.into_iter().filter(|n| n.value.is_finite()).map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value])).collect();
+        let place = Location::new(
+            told(rival.candidate.family.channel),
+            joints(found.robot, &rival.candidate),
+            regime::subsystem(&rival.candidate),
+            regime::regime(&rival.candidate),
+        );
+        let numbers = crate::parameters::parameters(
+            found.robot,
+            found.nominal,
+            &rival.candidate,
+            &rival.coefficients,
+            &rival.candidate.shape,
+        );
+        let numbers = numbers
+            .into_iter()
+            .filter(|n| n.value.is_finite())
+            .map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value]))
+            .collect();
         Verdict::alternative(number, self::physics(&rival.candidate), weight(best, rival.score) / total, place, numbers, Vec::new())
     });
     std::iter::once(verdict).chain(alternatives.collect::<Vec<_>>()).collect()
@@ -360,7 +389,14 @@ fn fits(found: &Found, candidate: &Candidate, theta: &[f64]) -> Vec<FitFigure> {
     let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
     let pair = (rms(before.into_iter()), rms(after.into_iter()));
     let floor = Some((found.floors[cell], FloorMethod::Innovations));
-    vec![FitFigure::rms(cell_quantity(found.robot, of), cell_unit(found.robot, of), Space::EquationError, pair, floor, held_ids(found))]
+    vec![FitFigure::rms(
+        cell_quantity(found.robot, of),
+        cell_unit(found.robot, of),
+        Space::EquationError,
+        pair,
+        floor,
+        held_ids(found),
+    )]
 }
 
 fn excess(found: &Found) -> Vec<ExcessRms> {

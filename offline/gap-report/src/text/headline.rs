@@ -42,7 +42,8 @@ pub fn quality_headline(check: &DataQuality) -> String {
     let known = LEADS.iter().find(|(name, _)| check.check == *name || check.check.starts_with(&format!("{name} ")));
     let known = known.filter(|_| check.level == Level::Fail);
     // The same check may fail on either side.
-    let other = (check.check == "input_sign" && check.message.contains("simulation")).then_some(&("", "The simulation's input has the wrong sign"));
+    let other = (check.check == "input_sign" && check.message.contains("simulation"))
+        .then_some(&("", "The simulation's input has the wrong sign"));
     let known = other.or(known);
     let lead = known.map_or_else(|| capital(&check.check.replace('_', " ")), |(_, lead)| (*lead).to_owned());
     let run = check.run.as_ref().map_or_else(String::new, |run| format!(" ({run})"));

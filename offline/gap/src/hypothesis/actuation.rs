@@ -19,16 +19,29 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         let bound = Bound::Between(-0.95, 5.0);
         all.push(Family::fixed("motor_torque_scale", &[j], "scale", TORQUE, &[bound], move |d| vec![total(d, j)]));
         all.push(
-            Family::fixed("motor_torque_scale", &[j], "scale and offset", TORQUE, &[bound, Bound::Free], move |d| vec![total(d, j), offset(d)])
-                .penalised(1.5),
+            Family::fixed("motor_torque_scale", &[j], "scale and offset", TORQUE, &[bound, Bound::Free], move |d| {
+                vec![total(d, j), offset(d)]
+            })
+            .penalised(1.5),
         );
-        all.push(Family::fixed("motor_torque_scale", &[j], "offset", TORQUE, &[Bound::Free], move |d| vec![offset(d)]).penalised(1.0));
+        all.push(
+            Family::fixed("motor_torque_scale", &[j], "offset", TORQUE, &[Bound::Free], move |d| vec![offset(d)]).penalised(1.0),
+        );
         if dictionary.problem.pairs.iter().all(|pair| pair.real.run.motor.is_some()) {
             let orders: Vec<f64> = (1..=ORDERS).map(f64::from).collect();
             all.push(
-                Family::shaped("torque_ripple", &[j], "motor turns", TORQUE, &[Bound::Free, Bound::Free], &[("order", false)], product(&[&orders]), move |d, s| {
-                    [0.0, std::f64::consts::FRAC_PI_2].map(|phase| d.effort_of(j, ripple(d, j, s[0], phase), false)).to_vec()
-                })
+                Family::shaped(
+                    "torque_ripple",
+                    &[j],
+                    "motor turns",
+                    TORQUE,
+                    &[Bound::Free, Bound::Free],
+                    &[("order", false)],
+                    product(&[&orders]),
+                    move |d, s| {
+                        [0.0, std::f64::consts::FRAC_PI_2].map(|phase| d.effort_of(j, ripple(d, j, s[0], phase), false)).to_vec()
+                    },
+                )
                 .penalised(15.0),
             );
         }
@@ -42,7 +55,9 @@ fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64>
         let motion = &dictionary.problem.pairs[r].real;
         let usual = crate::nominal::rms(motion.quick_velocity[j].iter().copied());
         let moving = |v: &f64| f64::from(u8::from(v.abs() > CREEPING * usual));
-        let wave = |motor: &Vec<Vec<f64>>| motor[j].iter().zip(&motion.quick_velocity[j]).map(|(angle, v)| (order * angle + phase).sin() * moving(v)).collect();
+        let wave = |motor: &Vec<Vec<f64>>| {
+            motor[j].iter().zip(&motion.quick_velocity[j]).map(|(angle, v)| (order * angle + phase).sin() * moving(v)).collect()
+        };
         motion.run.motor.as_ref().map_or_else(Vec::new, wave)
     })
 }

@@ -66,7 +66,8 @@ impl<'a> Dictionary<'a> {
             .enumerate()
             .flat_map(|(r, pair)| pair.real.rows.iter().enumerate().map(move |(k, &i)| (r, i, k)))
             .collect();
-        let tip_rows: Vec<(usize, usize)> = problem.cell(Channel::EndEffector, 0).map_or_else(Vec::new, |c| problem.cells[c].rows.clone());
+        let tip_rows: Vec<(usize, usize)> =
+            problem.cell(Channel::EndEffector, 0).map_or_else(Vec::new, |c| problem.cells[c].rows.clone());
         let n = problem.robot.joint_count();
         let mut ws = Workspace::new(&problem.robot.arm);
         let tip_jacobian = tip_rows

@@ -29,7 +29,10 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             let penalty = if at_link { 1.0 } else { 0.0 };
             let mut families = Vec::new();
             push_side(dictionary, j, form, at_link, &mut families);
-            all.extend(families.into_iter().map(|f| { let own = f.penalty_nats; f.penalised(own + penalty) }));
+            all.extend(families.into_iter().map(|f| {
+                let own = f.penalty_nats;
+                f.penalised(own + penalty)
+            }));
         }
     }
 }
@@ -45,27 +48,92 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     };
     let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
-    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("v_eps", true)], product(&[&slowest]),
-        move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)]));
-    all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[Bound::Positive], &[("presliding", true)], product(&[&travels[1..]]),
-        move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)]));
+    all.push(Family::shaped(
+        "coulomb_friction",
+        &[j],
+        form,
+        TORQUE,
+        &[Bound::Positive],
+        &[("v_eps", true)],
+        product(&[&slowest]),
+        move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)],
+    ));
+    all.push(Family::shaped(
+        "coulomb_friction",
+        &[j],
+        form,
+        TORQUE,
+        &[Bound::Positive],
+        &[("presliding", true)],
+        product(&[&travels[1..]]),
+        move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)],
+    ));
     for (name, starts, sign) in [("v_eps", &slowest[..], sign_below as Turn), ("presliding", &travels[1..], turning as Turn)] {
-        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], &[(name, true)], product(&[starts]),
-            move |d, s| vec![by_load(d, &sign(d, j, s[0]))]).penalised(1.0));
-        all.push(Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive, positive], &[(name, true)], product(&[starts]),
-            move |d, s| { let sign = sign(d, j, s[0]); vec![by_load(d, &sign), d.effort_of(j, sign, at_link)] }).penalised(3.0));
+        all.push(
+            Family::shaped(
+                "load_dependent_friction",
+                &[j],
+                form,
+                TORQUE,
+                &[positive],
+                &[(name, true)],
+                product(&[starts]),
+                move |d, s| vec![by_load(d, &sign(d, j, s[0]))],
+            )
+            .penalised(1.0),
+        );
+        all.push(
+            Family::shaped(
+                "load_dependent_friction",
+                &[j],
+                form,
+                TORQUE,
+                &[positive, positive],
+                &[(name, true)],
+                product(&[starts]),
+                move |d, s| {
+                    let sign = sign(d, j, s[0]);
+                    vec![by_load(d, &sign), d.effort_of(j, sign, at_link)]
+                },
+            )
+            .penalised(3.0),
+        );
         if !at_link {
-            all.push(Family::shaped("thermal_drift", &[j], "friction fades", TORQUE, &[Bound::Free], &[("T", true), (name, true)],
-                product(&[&HEATING_S, starts]),
-                move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, s[1])), false)]).penalised(2.0));
+            all.push(
+                Family::shaped(
+                    "thermal_drift",
+                    &[j],
+                    "friction fades",
+                    TORQUE,
+                    &[Bound::Free],
+                    &[("T", true), (name, true)],
+                    product(&[&HEATING_S, starts]),
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, s[1])), false)],
+                )
+                .penalised(2.0),
+            );
         }
     }
-    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive],
-        move |d| vec![d.effort_of(j, velocity(d), at_link)]));
+    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive], move |d| {
+        vec![d.effort_of(j, velocity(d), at_link)]
+    }));
     let slow = STRIBECK_SPEED.map(|share| share * speed);
-    all.push(Family::shaped("stribeck_friction", &[j], form, TORQUE, &[Bound::Positive, Bound::Positive], &[("v_s", true), ("a", true), ("v_eps", true)],
-        product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]),
-        move |d, s| { let (sign, extra) = stribeck(d, j, s); vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)] }).penalised(3.0));
+    all.push(
+        Family::shaped(
+            "stribeck_friction",
+            &[j],
+            form,
+            TORQUE,
+            &[Bound::Positive, Bound::Positive],
+            &[("v_s", true), ("a", true), ("v_eps", true)],
+            product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]),
+            move |d, s| {
+                let (sign, extra) = stribeck(d, j, s);
+                vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)]
+            },
+        )
+        .penalised(3.0),
+    );
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.

@@ -77,9 +77,16 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         let Some(first) = free.first().map(|k| *k as f64) else { continue };
         let y = y.clone();
         let bounds = vec![Bound::Free; free.len()];
-        let family = Family::shaped("link_inertia", &[link], "free", TORQUE, &bounds, &[("parameter", false)], vec![vec![first]], move |d, _| {
-            free.iter().map(|k| parameter_column(d, &y, link, *k)).collect()
-        });
+        let family = Family::shaped(
+            "link_inertia",
+            &[link],
+            "free",
+            TORQUE,
+            &bounds,
+            &[("parameter", false)],
+            vec![vec![first]],
+            move |d, _| free.iter().map(|k| parameter_column(d, &y, link, *k)).collect(),
+        );
         all.push(family.penalised(4.0));
     }
     push_gravity(all);

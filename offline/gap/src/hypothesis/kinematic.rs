@@ -39,11 +39,19 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let free = Bound::Free;
     let turns = ["w_x", "w_y", "w_z"];
     all.push(
-        Family::secant("frame_misalignment", &[], "turned and moved", TIP, &[turned, turned, turned, free, free, free], &turns, move |d, s| {
-            let mut columns = turning(d, s);
-            columns.extend(moves(d));
-            columns
-        })
+        Family::secant(
+            "frame_misalignment",
+            &[],
+            "turned and moved",
+            TIP,
+            &[turned, turned, turned, free, free, free],
+            &turns,
+            move |d, s| {
+                let mut columns = turning(d, s);
+                columns.extend(moves(d));
+                columns
+            },
+        )
         .penalised(1.0),
     );
     all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[free; 3], move |d| moves(d).to_vec()));

@@ -11,9 +11,14 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if problem.cell(Channel::EndEffector, 0).is_some() {
         all.push(Family::fixed("measurement_delay", &[], "tip", Channel::EndEffector, &[bound], |d| vec![late_tip(d, |_, _| 1.0)]));
         all.push(
-            Family::fixed("measurement_delay", &[], "tip, drifting", Channel::EndEffector, &[bound, Bound::Between(-0.01, 0.01)], |d| {
-                vec![late_tip(d, |_, _| 1.0), late_tip(d, |r, i| i as f64 * d.problem.pairs[r].real.run.dt_s)]
-            })
+            Family::fixed(
+                "measurement_delay",
+                &[],
+                "tip, drifting",
+                Channel::EndEffector,
+                &[bound, Bound::Between(-0.01, 0.01)],
+                |d| vec![late_tip(d, |_, _| 1.0), late_tip(d, |r, i| i as f64 * d.problem.pairs[r].real.run.dt_s)],
+            )
             .penalised(2.0),
         );
     }

@@ -45,16 +45,19 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         move |d, s| vec![d.deflection_of(j, lag(d, j, s[0]))],
     ));
     let usual = size(&dictionary.load(j)).max(1e-9);
-    all.push(Family::shaped(
-        "backlash",
-        &[j],
-        "rests on the loaded side",
-        TRANSMISSION,
-        &[Bound::Positive],
-        &[("crossing", true)],
-        product(&[&CROSSING.map(|share| share * usual)]),
-        move |d, s| vec![d.deflection_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
-    ).penalised(1.5));
+    all.push(
+        Family::shaped(
+            "backlash",
+            &[j],
+            "rests on the loaded side",
+            TRANSMISSION,
+            &[Bound::Positive],
+            &[("crossing", true)],
+            product(&[&CROSSING.map(|share| share * usual)]),
+            move |d, s| vec![d.deflection_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
+        )
+        .penalised(1.5),
+    );
 }
 
 /// How far the motor runs ahead of a joint with play.
@@ -98,16 +101,30 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     );
     for (form, settled) in [("settled at the start", true), ("fresh at the start", false)] {
         all.push(
-            Family::shaped("cable_creep", &[j], form, TRANSMISSION, &[Bound::Positive], &[("T_k", true)], product(&[&CREEP_S]), move |d, s| {
-                vec![d.deflection_of(j, crept(d, j, s[0], settled))]
-            })
+            Family::shaped(
+                "cable_creep",
+                &[j],
+                form,
+                TRANSMISSION,
+                &[Bound::Positive],
+                &[("T_k", true)],
+                product(&[&CREEP_S]),
+                move |d, s| vec![d.deflection_of(j, crept(d, j, s[0], settled))],
+            )
             .penalised(1.0),
         );
     }
     all.push(
-        Family::shaped("thermal_drift", &[j], "position", TRANSMISSION, &[Bound::Free], &[("T", true)], product(&[&super::friction::HEATING_S]), move |d, s| {
-            vec![d.deflection_of(j, super::friction::heat(d, j, s[0]))]
-        })
+        Family::shaped(
+            "thermal_drift",
+            &[j],
+            "position",
+            TRANSMISSION,
+            &[Bound::Free],
+            &[("T", true)],
+            product(&[&super::friction::HEATING_S]),
+            move |d, s| vec![d.deflection_of(j, super::friction::heat(d, j, s[0]))],
+        )
         .penalised(3.0),
     );
 }
@@ -188,13 +205,18 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
     let (small, free) = (Bound::Between(-0.5, 0.5), Bound::Free);
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
-    all.push(Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5));
-    all.push(Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
-        // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
-        let mut column = ratio(d);
-        column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
-        vec![column]
-    }).penalised(0.5));
+    all.push(
+        Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5),
+    );
+    all.push(
+        Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
+            // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
+            let mut column = ratio(d);
+            column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+            vec![column]
+        })
+        .penalised(0.5),
+    );
     all.push(
         Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, free], move |d| {
             vec![ratio(d), offset(d, j)]
@@ -205,12 +227,21 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let (from, to, count) = PERIODS;
     let periods: Vec<f64> = (0..count).map(|k| travel * from * (to / from).powf(k as f64 / (count - 1) as f64)).collect();
     all.push(
-        Family::shaped("pulley_eccentricity", &[j], "once per turn", TRANSMISSION, &[free, free], &[("period", true)], product(&[&periods]), move |d, s| {
-            let q = position(d, j);
-            // q_true = q + e sin(...): the deflection is the opposite.
-            let wave = |phase: f64| q.iter().map(|q| -(std::f64::consts::TAU * q / s[0] + phase).sin()).collect();
-            vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
-        })
+        Family::shaped(
+            "pulley_eccentricity",
+            &[j],
+            "once per turn",
+            TRANSMISSION,
+            &[free, free],
+            &[("period", true)],
+            product(&[&periods]),
+            move |d, s| {
+                let q = position(d, j);
+                // q_true = q + e sin(...): the deflection is the opposite.
+                let wave = |phase: f64| q.iter().map(|q| -(std::f64::consts::TAU * q / s[0] + phase).sin()).collect();
+                vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
+            },
+        )
         .penalised(2.0),
     );
 }
@@ -220,18 +251,23 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     for i in (0..dictionary.joints()).filter(|i| *i != j) {
         let coupled = move |d: &Dictionary| d.deflection_of(j, position(d, i));
         let pair = [j, i];
-        all.push(Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]).penalised(1.0));
+        all.push(
+            Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]).penalised(1.0),
+        );
         all.push(
             Family::fixed("joint_coupling", &pair, "position about a place", TRANSMISSION, &[small, Bound::Free], move |d| {
                 vec![coupled(d), offset(d, j)]
             })
             .penalised(1.5),
         );
-        all.push(Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
-            // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
-            let mut column = coupled(d);
-            column.push(d.problem.cell(Channel::JointTorque, i), minus(&d.load(j)));
-            vec![column]
-        }).penalised(1.0));
+        all.push(
+            Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
+                // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
+                let mut column = coupled(d);
+                column.push(d.problem.cell(Channel::JointTorque, i), minus(&d.load(j)));
+                vec![column]
+            })
+            .penalised(1.0),
+        );
     }
 }
