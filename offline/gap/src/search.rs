@@ -33,8 +33,17 @@ impl Default for Thresholds {
 /// Steps of the grid of windows in a run.
 const EDGES: usize = 12;
 /// What does not begin or end in a run: it is slow itself, or part of the machine.
-const ALWAYS: [&str; 6] =
-    ["thermal_drift", "cable_hysteresis", "torque_ripple", "pulley_eccentricity", "stribeck_friction", "load_dependent_friction"];
+const ALWAYS: [&str; 9] = [
+    "thermal_drift",
+    "cable_hysteresis",
+    "torque_ripple",
+    "pulley_eccentricity",
+    "stribeck_friction",
+    "load_dependent_friction",
+    "link_geometry",
+    "frame_misalignment",
+    "measurement_delay",
+];
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
 

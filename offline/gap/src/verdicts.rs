@@ -409,7 +409,8 @@ fn excess(found: &Found) -> Vec<ExcessRms> {
             let size = rms(cell.residual.iter().copied());
             ExcessRms {
                 channel: told(cell.channel),
-                joint: Some(cell_name(found.robot, cell)),
+                // An axis of the tip is no joint.
+                joint: (cell.channel != Channel::EndEffector).then(|| cell_name(found.robot, cell)),
                 value: (size * size - found.floors[c].powi(2)).max(0.0).sqrt(),
                 unit: cell_unit(found.robot, cell).to_owned(),
                 noise_floor: found.floors[c],

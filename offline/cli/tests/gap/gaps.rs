@@ -37,8 +37,11 @@ fn at(header: &[&str], column: &str) -> usize {
 }
 
 fn named_friction(report: &Report) -> f64 {
-    let first = primary(report)[0];
-    assert_eq!(first.physics.to_string(), "coulomb_friction", "{}", report.summary);
+    // Where the simulation has to be shifted by a fraction of a sample, a stretch of the same cable is named beside it (a known
+    // fault: decision 0010), so the friction is looked for, not the first verdict.
+    let primary = primary(report);
+    let found = primary.iter().find(|verdict| verdict.physics.to_string() == "coulomb_friction");
+    let first = found.unwrap_or_else(|| panic!("no dry friction: {}", report.summary));
     assert_eq!(first.location.joint, ["elbow"]);
     first.parameters.iter().find(|parameter| parameter.name == "f_c").expect("f_c").value
 }
