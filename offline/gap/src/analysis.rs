@@ -143,7 +143,7 @@ pub fn analyse(
                     apart.push(sim.clone());
                 }
                 // Of another rate: another run of its own, which says what to believe, and no more.
-                if (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
+                if !alike(&real, &sim) && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
                     (Run { id: one.id.clone(), ..real }, None)
                 } else {
                     let (real, sim) = common(&real, &sim)?;
