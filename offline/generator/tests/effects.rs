@@ -182,9 +182,10 @@ fn transmission() {
     effect.details.insert("from".into(), 1.0);
     let with = bench.play(&[effect]);
     let shifted = bench.shifted(&with, 1);
-    near(slope((0..count).map(|k| (with.joint[k][0], shifted[k]))), 0.02, 0.05);
-    // the driving joint feels the driven cable: by virtual work -c times its load, held by its own motor
-    let pull = (300..count).map(|k| (0.02 * with.load[k][1], with.load[k][0] - bench.without.load[k][0]));
+    // the motor of joint 2 turns by c q_1 more than its joint: the joint stays behind by that much
+    near(slope((0..count).map(|k| (-with.joint[k][0], shifted[k]))), 0.02, 0.05);
+    // the driving joint feels the driven cable: by virtual work c times its load, which relieves its own motor
+    let pull = (300..count).map(|k| (-0.02 * with.load[k][1], with.load[k][0] - bench.without.load[k][0]));
     near(slope(pull), 1.0, 0.2);
 }
 
