@@ -13,7 +13,7 @@ use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
-use crate::run::{Run, RunError, alike, common};
+use crate::run::{Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Thresholds, search};
 use crate::{corrected, flexible, verdicts};
 
@@ -125,7 +125,8 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
         let sim = one.sim.as_ref().map(|(sim, _)| Run::new(sim, &robot)).transpose()?;
         runs.push(match sim {
             Some(sim) => {
-                if !alike(&real, &sim) {
+                // One as noisy as the recording is a recording of its own, whose noise would only be added.
+                if !alike(&real, &sim) || as_noisy(&real, &sim) {
                     apart.push(sim.clone());
                 }
                 // Of another rate: another run of its own, which says what to believe, and no more.
@@ -147,13 +148,14 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     }
     // With torques of their own they say what to believe of the robot, but not sample by sample.
     let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
+    let from_recording = runs.iter().any(|(real, _)| apart.iter().any(|sim| as_noisy(real, sim)));
     if !apart.is_empty() {
         runs.iter_mut().for_each(|run| run.1 = None);
     }
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
         return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
     }
-    let band = Band::SLOW;
+    let band = if from_recording { Band::LEARNT } else { Band::SLOW };
     let (train, held) = split(&runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
     if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {
@@ -167,10 +169,15 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     progress("learning what the simulator believes");
     let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
     sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
-    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
+    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn_with(&robot, &sims, from_recording) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
-    let problem = if sims.is_empty() { problem.believed_roughly() } else { problem };
+    let prior = match (sims.is_empty(), from_recording) {
+        (true, _) => Prior::Believed,
+        (false, true) => Prior::Drifting,
+        (false, false) => Prior::Exact,
+    };
+    let problem = prior.put_on(problem);
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
@@ -187,11 +194,12 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
-    let unmodelled = beyond > 2.0 * options.thresholds.nats
+    let unmodelled = beyond_recording(&problem, &answer, &ceiling)
+        && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
     let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
-    let held_problem = if sims.is_empty() { held_problem.believed_roughly() } else { held_problem };
+    let held_problem = prior.put_on(held_problem);
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
     let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
@@ -217,6 +225,34 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
     outcome.report.timing.threads = Some(2);
     Ok(outcome)
+}
+
+/// How far the nominal model is to be trusted.
+#[derive(Debug, Clone, Copy)]
+enum Prior {
+    /// The lab's own numbers, which no simulation has shown.
+    Believed,
+    /// Learnt from another recording.
+    Drifting,
+    /// Learnt from a simulation.
+    Exact,
+}
+
+impl Prior {
+    fn put_on<'a>(self, problem: Problem<'a>) -> Problem<'a> {
+        match self {
+            Self::Believed => problem.believed_roughly(),
+            Self::Drifting => problem.learnt_from_recording(),
+            Self::Exact => problem,
+        }
+    }
+}
+
+/// Is what the effects leave, where the ceiling gains most, more than the nominal model leaves of the robot that it knows?
+fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceiling) -> bool {
+    let Some((c, _)) = ceiling.cell else { return true };
+    let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
+    !problem.from_recording || within.sqrt() > 2.0 * problem.practical[c]
 }
 
 fn too_short(seconds: f64) -> DataQuality {

@@ -17,6 +17,9 @@ impl Band {
     /// motor and link apart, and stepped encoders rattle.
     pub const SLOW: Self = Self { sigma_s: 0.012, step_s: 0.02 };
 
+    /// What a model learnt from another recording can follow: half power at 2.7 Hz.
+    pub const LEARNT: Self = Self { sigma_s: 0.05, step_s: 0.02 };
+
     /// The same for a recording with a period of `dt_s`.
     #[must_use]
     pub fn for_period(self, dt_s: f64) -> Self {

@@ -7,7 +7,7 @@
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
-use crate::nominal::rms;
+use crate::nominal::{rms, sign_series};
 use crate::problem::{Channel, Problem};
 
 /// Columns of one cell, each for one standard deviation of what is believed.
@@ -147,6 +147,33 @@ pub fn believed(problem: &Problem) -> Vec<Nuisance> {
         let inertia = if rotor > 0.0 { 0.5 * rotor } else { 0.1 * usual / rms(acceleration.iter().copied()).max(1e-12) };
         all[c].push(acceleration.into_iter().map(|a| inertia * a).collect(), false);
         all[c].push(vec![BELIEF * usual; cell.rows.len()], false);
+    }
+    all
+}
+
+/// Shares of what was learnt by which friction, rotor and zero point of a drive differ from one day to the next.
+const FRICTION_DRIFT: f64 = 0.4;
+const ZERO_DRIFT: f64 = 0.15;
+/// The same of a drive's inertia, of all that it moves.
+const INERTIA_DRIFT: f64 = 0.1;
+
+/// Nuisances of every cell of a model that was learnt from another recording: friction, constants.
+pub fn drifting(problem: &Problem) -> Vec<Nuisance> {
+    let mut all = vec![Nuisance::default(); problem.cells.len()];
+    for j in 0..problem.robot.joint_count() {
+        let Some(c) = problem.cell(Channel::JointTorque, j) else { continue };
+        let cell = &problem.cells[c];
+        let [_, viscous, coulomb, _] = problem.nominal.drives[j];
+        let signs: Vec<Vec<f64>> = problem.pairs.iter().map(|pair| sign_series(&pair.real, j)).collect();
+        let torque = |&(r, i): &(usize, usize)| problem.pairs[r].real.torque.as_ref().map_or(0.0, |t: &Vec<Vec<f64>>| t[j][i]);
+        let usual = rms(cell.rows.iter().map(torque));
+        all[c].push(cell.rows.iter().map(|&(r, i)| FRICTION_DRIFT * coulomb * signs[r][i]).collect(), false);
+        all[c].push(cell.rows.iter().map(|&(r, i)| FRICTION_DRIFT * viscous * problem.pairs[r].real.drive_velocity[j][i]).collect(), false);
+        all[c].push(vec![ZERO_DRIFT * usual; cell.rows.len()], false);
+        // An elastic drive at another pace seems to have another inertia.
+        let acceleration: Vec<f64> = cell.rows.iter().map(|&(r, i)| problem.pairs[r].real.drive_acceleration[j][i]).collect();
+        let inertia = INERTIA_DRIFT * usual / rms(acceleration.iter().copied()).max(1e-12);
+        all[c].push(acceleration.into_iter().map(|a| inertia * a).collect(), false);
     }
     all
 }

@@ -34,6 +34,8 @@ pub struct PayloadSite {
     pub link: usize,
     /// In the link's frame, m.
     pub position_m: [f64; 3],
+    /// What to call it.
+    pub name: Option<String>,
 }
 
 /// An arm with its drives.
@@ -83,7 +85,7 @@ impl Robot {
                 offset: drive.offset,
             }
         });
-        let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m });
+        let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m, name: site.name.clone() });
         Self {
             name: model.name().to_owned(),
             joints: model.joint_names().into_iter().take(n).collect(),

@@ -175,6 +175,21 @@ pub fn alike(real: &Run, sim: &Run) -> bool {
     })
 }
 
+/// Share of the recording's own jitter from which on a simulation's torque is not that of a simulation.
+const JITTER: f64 = 0.3;
+
+/// Does the torque of one jitter like that of the other?
+pub fn as_noisy(real: &Run, sim: &Run) -> bool {
+    let jitter = |run: &Run, j: usize| {
+        let series = run.torque.as_ref().map_or(&[][..], |torque| &torque[j]);
+        let mut steps: Vec<f64> = series.windows(4).map(|x| (x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    };
+    let n = real.position.len();
+    2 * (0..n).filter(|&j| jitter(sim, j) > JITTER * jitter(real, j)).count() > n
+}
+
 /// The common stretch of a recording and its simulation, sample for sample.
 ///
 /// # Errors

@@ -77,7 +77,8 @@ fn window_noise(problem: &Problem) -> Vec<Noise> {
     let motion = &problem.pairs[0].real;
     let step = motion.rows.get(1).map_or(1, |second| second - motion.rows[0]);
     let behind = motion.window.autocovariance(step, 3);
-    let of = |tip: bool, rows: usize| if tip { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
+    let white = problem.from_recording;
+    let of = |tip: bool, rows: usize| if tip || white { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
     problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()
 }
 
@@ -157,8 +158,9 @@ impl Search<'_, '_> {
             .filter(|c| shares[*c] >= self.thresholds.share)
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
             .fold(0.0, f64::max);
+        let enough = (0..shares.len()).any(|c| !self.problem.from_recording || (shares[c] >= self.thresholds.share && own[c] >= self.problem.practical[c]));
         let share = shares.into_iter().fold(0.0, f64::max);
-        let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
+        let amplitude = if !enough { -1.0 } else if others.is_empty() { f64::INFINITY } else { amplitude };
         (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)
     }
 
@@ -208,7 +210,8 @@ impl Search<'_, '_> {
 
     fn accepts(&self, best: &Scored, share: f64, amplitude: f64) -> bool {
         let alone = amplitude.is_infinite();
-        best.score >= self.thresholds.nats
+        amplitude >= 0.0
+            && best.score >= self.thresholds.nats
             && best.gain.least >= 0.5 * self.thresholds.nats
             && (alone || (share >= self.thresholds.share && amplitude >= self.thresholds.amplitude))
     }
