@@ -25,6 +25,8 @@ pub struct Nominal {
     /// Per joint: what springs and cables pull with the first, second and third power of its position. All 0 but where the
     /// model was learnt from a recording.
     pub springs: Vec<[f64; SPRINGS]>,
+    /// RMS of the torque of the runs that it was learnt from, per joint; 0 where nothing was learnt.
+    pub usual_torque: Vec<f64>,
     /// RMS of what the model leaves of the simulation's own torque, per joint; 0 where nothing was learnt.
     pub torque_error: Vec<f64>,
 }
@@ -50,6 +52,7 @@ impl Nominal {
             drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
             compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
             springs: vec![[0.0; SPRINGS]; n],
+            usual_torque: vec![0.0; n],
             torque_error: vec![0.0; n],
         }
     }
@@ -153,6 +156,7 @@ impl Nominal {
         for j in (0..n).filter(|_| springs) {
             self.springs[j].copy_from_slice(&right.as_slice()[sprung + SPRINGS * j..][..SPRINGS]);
         }
+        self.usual_torque = torque_scale.iter().map(|s| s / 0.05).collect();
         self.torque_error = self.torque_left(robot, runs);
     }
 

@@ -55,6 +55,8 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         )
         .penalised(3.0),
     );
+    // The links of one robot are the same in two recordings of it.
+    let altered = if dictionary.problem.from_recording { 20.0 } else { 0.0 };
     for link in 0..n {
         let parameters = robot.arm.link_inertia(link).parameters();
         if parameters.iter().any(|x| *x != 0.0) {
@@ -62,7 +64,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 Family::fixed("link_inertia", &[link], "scaled", TORQUE, &[Bound::Between(-0.95, 20.0)], move |d| {
                     vec![weighted_column(d, link, &parameters)]
                 })
-                .penalised(1.0),
+                .penalised(1.0 + altered),
             );
         }
         // The parameter that the motion shows best comes first, and is the one that is reported.
@@ -72,7 +74,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         let family = Family::shaped("link_inertia", &[link], "free", TORQUE, &bounds, &[("parameter", false)], vec![vec![first]], move |d, _| {
             free.iter().map(|k| parameter_column(d, link, *k)).collect()
         });
-        all.push(family.penalised(4.0));
+        all.push(family.penalised(4.0 + altered));
     }
     push_gravity(all);
 }
