@@ -106,6 +106,8 @@ const HELD_OUT: f64 = 1.0 / 3.0;
 const BLOCK_S: f64 = 1.5;
 /// Most blocks.
 const BLOCKS: f64 = 40.0;
+/// Most effects of a table of points.
+const MOST_OF_POINTS: usize = 9;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
@@ -184,7 +186,10 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
-    let mut answer = search(&problem, &dictionary, &options.thresholds, &mut |line| {
+    // Points have offset, play and coupling on every joint, and nothing else.
+    let points = train.iter().all(|pair| pair.real.run.points);
+    let thresholds = Thresholds { effects: if points { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
+    let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
         if options.trace {
             eprintln!("{line}");
         }
@@ -252,7 +257,7 @@ impl Prior {
 fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceiling) -> bool {
     let Some((c, _)) = ceiling.cell else { return true };
     let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
-    !problem.from_recording || within.sqrt() > 2.0 * problem.practical[c]
+    !problem.from_recording || within.sqrt() > problem.practical[c]
 }
 
 fn too_short(seconds: f64) -> DataQuality {

@@ -66,13 +66,14 @@ impl Motion {
     /// Smooths a run.
     pub fn new(run: Run, band: Band) -> Self {
         let band = band.for_period(run.dt_s);
-        let window = Window::new(band.sigma_s, run.dt_s);
+        let over = |sigma_s: f64| if run.points { Window::identity() } else { Window::new(sigma_s, run.dt_s) };
+        let window = over(band.sigma_s);
         let smooth = |set: &[Vec<f64>], derivative: usize| set.iter().map(|s| window.apply(s, derivative)).collect::<Vec<_>>();
-        let quick = Window::new(QUICK_SIGMA_S.min(band.sigma_s), run.dt_s);
+        let quick = over(QUICK_SIGMA_S.min(band.sigma_s));
         let deflection: Option<Vec<Vec<f64>>> = run.truth.as_ref().map(|truth| {
             run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect()
         });
-        let slow = Window::new(DEFLECTION_SIGMA_S.max(band.sigma_s), run.dt_s);
+        let slow = over(DEFLECTION_SIGMA_S.max(band.sigma_s));
         let margin = window.margin();
         let step = ((band.step_s / run.dt_s).round() as usize).max(1);
         let usable = margin..run.len().saturating_sub(margin);

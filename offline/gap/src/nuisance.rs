@@ -149,6 +149,16 @@ pub fn believed(problem: &Problem) -> Vec<Nuisance> {
         all[c].push(acceleration.into_iter().map(|a| inertia * a).collect(), false);
         all[c].push(vec![BELIEF * usual; cell.rows.len()], false);
     }
+    // What measures the joints stands anew for every run.
+    let runs = problem.pairs.len();
+    for (c, cell) in problem.cells.iter().enumerate().filter(|(_, cell)| runs > 1 && cell.channel == Channel::Transmission) {
+        let size = rms(cell.residual.iter().copied());
+        for run in 0..runs {
+            let mean = 1.0 / runs as f64;
+            let of = |&(r, _): &(usize, usize)| size * (f64::from(u8::from(r == run)) - mean);
+            all[c].push(cell.rows.iter().map(of).collect(), true);
+        }
+    }
     all
 }
 

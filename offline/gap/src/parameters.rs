@@ -79,6 +79,11 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("backlash", "follows the motion") => vec![named("b", position, shaped("b"))],
         ("backlash", _) => vec![named("b", position, theta[0])],
         ("cable_stretch", _) => vec![named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0])],
+        ("cable_hysteresis", "play of many widths") => {
+            // Share that follows without memory; the width that the others have on average.
+            let lost: f64 = theta.iter().sum();
+            vec![named("a", "1", (1.0 - lost).clamp(0.0, 1.0))]
+        }
         ("cable_hysteresis", _) => vec![
             named("a", "1", shaped("a")),
             named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0]),

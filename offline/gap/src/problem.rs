@@ -66,6 +66,20 @@ pub struct Problem<'a> {
     pub from_recording: bool,
 }
 
+/// Times that an effect has to exceed what the nominal model leaves of the robot that it was learnt from.
+const BEYOND: f64 = 2.0;
+/// Travel below which a joint stands, rad and m.
+const STANDING: f64 = 0.01;
+const STANDING_M: f64 = 0.001;
+
+/// Does a joint move, in some run, so that its torque says more than where it hangs?
+fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
+    pairs.iter().any(|pair| {
+        let (low, high) = pair.real.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        high - low > if robot.prismatic[j] { STANDING_M } else { STANDING }
+    })
+}
+
 impl<'a> Problem<'a> {
     /// Forms the residuals of the runs.
     pub fn new(robot: &'a Robot, nominal: &'a Nominal, pairs: &'a [Pair], block_s: f64) -> Self {
@@ -92,7 +106,7 @@ impl<'a> Problem<'a> {
             from_recording: false,
         };
         if pairs.iter().all(|pair| pair.real.torque.is_some()) {
-            (0..n).for_each(|j| problem.push_torque(j, &sim_loads));
+            (0..n).filter(|j| moves(robot, pairs, *j)).for_each(|j| problem.push_torque(j, &sim_loads));
         }
         if pairs.iter().all(|pair| pair.real.deflection.is_some()) {
             (0..n).for_each(|j| problem.push_transmission(j, &sim_loads));
@@ -110,7 +124,7 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub fn learnt_from_recording(mut self) -> Self {
         self.nuisances = drifting(&self);
-        let of = |cell: &Cell| if cell.channel == Channel::JointTorque { self.nominal.torque_error[cell.index] } else { 0.0 };
+        let of = |cell: &Cell| if cell.channel == Channel::JointTorque { BEYOND * self.nominal.torque_error[cell.index] } else { 0.0 };
         self.practical = self.cells.iter().map(of).collect();
         self.from_recording = true;
         self
@@ -232,6 +246,11 @@ impl<'a> Problem<'a> {
                     .collect()
             })
             .collect();
+    }
+
+    /// Is there any cell of a channel?
+    pub fn has(&self, channel: Channel) -> bool {
+        self.cells.iter().any(|cell| cell.channel == channel)
     }
 
     /// Index of a cell, if the recording has it.

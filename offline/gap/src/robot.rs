@@ -55,6 +55,8 @@ pub struct Robot {
     pub motor_from_joint: DMatrix<f64>,
     /// One per joint.
     pub drives: Vec<DriveNominal>,
+    /// Names of columns of its recordings that are not those of tidy CSV: name, name in the recording, scale.
+    pub columns: Vec<(String, String, f64)>,
     /// Candidate places of a payload beside the last link.
     pub payload_sites: Vec<PayloadSite>,
 }
@@ -92,6 +94,7 @@ impl Robot {
             links: model.link_names().into_iter().take(n).collect(),
             prismatic: arm.bodies().iter().take(n).map(|body| body.joint.kind.is_prismatic()).collect(),
             drives: drives.collect(),
+            columns: model.columns.iter().map(|c| (c.name.clone(), c.source.clone(), c.scale)).collect(),
             payload_sites: sites.collect(),
             motor_from_joint,
             arm,

@@ -43,8 +43,10 @@ pub struct Run {
     pub id: String,
     /// First time, s.
     pub start_s: f64,
-    /// Sample period, s.
+    /// Sample period, s; 1 of points.
     pub dt_s: f64,
+    /// Are the samples points without a clock, at each of which the robot stood?
+    pub points: bool,
     /// Joint positions as the motors say them, rad or m.
     pub position: Vec<Vec<f64>>,
     /// Torques of the motors at the joints (Aᵀ τ), N·m or N.
@@ -83,17 +85,30 @@ impl Run {
     /// [`RunError`] where time or positions are missing.
     pub fn new(recording: &Recording, robot: &Robot) -> Result<Self, RunError> {
         let run = recording.name.clone();
-        let time = recording.time_s().ok_or_else(|| RunError::NoTime { run: run.clone() })?;
         let n = robot.joint_count();
-        let clock = Clock::new(time);
-        let series = |name: &str| recording.column(name).map(|column| clock.resample(time, column));
+        let clock = match recording.time_s() {
+            Some(time) if !by_points(time) => Clock::new(time),
+            // Points at which the robot stopped and was measured: their order is known, and that is all that is needed.
+            _ if is_table(recording, robot) => Clock::of_points(recording.rows()),
+            Some(time) => Clock::new(time),
+            None => return Err(RunError::NoTime { run }),
+        };
+        let time: Vec<f64> = recording.time_s().map_or_else(Vec::new, <[f64]>::to_vec);
+        let mapped = |name: &str| {
+            let (_, source, scale) = robot.columns.iter().find(|(own, ..)| own == name)?;
+            recording.column(source).map(|column| column.iter().map(|x| x * scale).collect::<Vec<f64>>())
+        };
+        let series = |name: &str| {
+            let column = mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec))?;
+            Some(clock.resample(&time, &column))
+        };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
         // The first of the names that every joint has.
         let all = |names: &[&dyn Fn(usize) -> String]| {
             names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
         };
         let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
-        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1)]);
+        let reported = all(&[&|j| format!("jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_{}_{}", j + 1, unit(j)), &|j| format!("q_{}", j + 1), &|j| format!("q_des_{}", j + 1), &|j| format!("q_des_{}_{}", j + 1, unit(j))]);
         let from_motors = motor.is_some();
         let position = match (&motor, reported) {
             (Some(motor), _) => {
@@ -133,10 +148,11 @@ impl Run {
             id: run,
             start_s: clock.start_s,
             dt_s: clock.dt_s,
+            points: clock.points,
             drive: combine(&robot.coupling(), &position),
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
-            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
+            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| format!("q_act_{}_{}", j + 1, unit(j))]),
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
@@ -151,6 +167,7 @@ impl Run {
             id: self.id.clone(),
             start_s: self.time_s(from),
             dt_s: self.dt_s,
+            points: self.points,
             position: cut(&self.position),
             drive: cut(&self.drive),
             torque: self.torque.as_ref().map(cut),
@@ -229,9 +246,35 @@ struct Clock {
     dt_s: f64,
     count: usize,
     uniform: bool,
+    points: bool,
+}
+
+/// Seconds between samples beyond which an uneven clock is none.
+const SLOW_S: f64 = 0.1;
+
+/// Are these times those of points that were measured one after the other?
+fn by_points(time: &[f64]) -> bool {
+    let clock = Clock::new(time);
+    !clock.uniform && clock.dt_s > SLOW_S
+}
+
+/// Has a recording what can be compared without a clock: positions, and the same measured at the joints?
+fn is_table(recording: &Recording, robot: &Robot) -> bool {
+    let has = |name: &String| {
+        let mapped = robot.columns.iter().any(|(own, source, _)| own == name && recording.column(source).is_some());
+        mapped || recording.column(name).is_some()
+    };
+    (0..robot.joint_count()).all(|j| {
+        let (n, unit) = (j + 1, robot.position_unit(j));
+        [format!("truth_jpos_{n}_{unit}"), format!("q_act_{n}"), format!("q_act_{n}_{unit}")].iter().any(has)
+    })
 }
 
 impl Clock {
+    fn of_points(count: usize) -> Self {
+        Self { start_s: 0.0, dt_s: 1.0, count, uniform: true, points: true }
+    }
+
     fn new(time: &[f64]) -> Self {
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
@@ -239,7 +282,7 @@ impl Clock {
         let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
         let count = (span / dt_s).round() as usize + 1;
         let uniform = count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
-        Self { start_s, dt_s, count, uniform }
+        Self { start_s, dt_s, count, uniform, points: false }
     }
 
     /// Linear between samples; a sample next to an empty cell stays empty.

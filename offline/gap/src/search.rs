@@ -158,7 +158,12 @@ impl Search<'_, '_> {
             .filter(|c| shares[*c] >= self.thresholds.share)
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
             .fold(0.0, f64::max);
-        let enough = (0..shares.len()).any(|c| !self.problem.from_recording || (shares[c] >= self.thresholds.share && own[c] >= self.problem.practical[c]));
+        let theta = &after.coefficients[after.coefficients.len() - scored.candidate.columns.len()..];
+        let beyond = |c: usize| {
+            let told = scored.candidate.effect(c, theta);
+            !told.is_empty() && crate::nominal::rms(self.problem.nuisances[c].without(&told).into_iter()) >= self.problem.practical[c]
+        };
+        let enough = !self.problem.from_recording || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if !enough { -1.0 } else if others.is_empty() { f64::INFINITY } else { amplitude };
         (Scored { score: gain.nats - price(&scored.candidate), gain, ..scored }, share, amplitude)

@@ -347,7 +347,14 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
         after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
     }
     let nuisance = &found.held.nuisances[c];
-    if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
+    if found.problem.nuisances[cell].of_run.contains(&true) {
+        let rows = &found.held.cells[c].rows;
+        for run in 0..found.held.pairs.len() {
+            let own = || rows.iter().enumerate().filter(|(_, row)| row.0 == run).map(|(k, _)| k);
+            let mean = own().map(|k| after[k]).sum::<f64>() / own().count().max(1) as f64;
+            own().for_each(|k| after[k] -= mean);
+        }
+    } else if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
         after.iter_mut().zip(nuisance.predict(&found.beside[cell])).for_each(|(y, p)| *y -= p);
     }
     Some((c, before, after))

@@ -32,7 +32,7 @@ impl Tips {
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
-    if dictionary.problem.cell(TORQUE, 0).is_none() {
+    if !dictionary.problem.has(TORQUE) {
         return;
     }
     let tips = Arc::new(tips(dictionary));

@@ -9,7 +9,7 @@ use crate::nominal::Evaluator;
 use crate::problem::Channel;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
-    if dictionary.problem.cell(TORQUE, 0).is_none() {
+    if !dictionary.problem.has(TORQUE) {
         return;
     }
     let robot = dictionary.problem.robot;

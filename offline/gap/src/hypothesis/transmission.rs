@@ -6,6 +6,8 @@ use crate::problem::Channel;
 
 /// Widths of play, shares of a joint's travel.
 const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.012, 0.018, 0.027, 0.04, 0.06, 0.09, 0.14];
+/// Widths of play that stand beside each other, shares of a joint's travel.
+const WIDTHS: [f64; 6] = [0.01, 0.03, 0.08, 0.2, 0.4, 0.7];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// Shares of the straight spring in a Bouc-Wen element.
@@ -21,7 +23,7 @@ const TRANSMISSION: Channel = Channel::Transmission;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let problem = dictionary.problem;
-    if problem.cell(TRANSMISSION, 0).is_none() && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
+    if !problem.has(TRANSMISSION) && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
         return;
     }
     for j in 0..dictionary.joints() {
@@ -44,6 +46,16 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         product(&[&PLAY.map(|share| share * travel)]),
         move |d, s| vec![d.deflection_of(j, lag(d, j, s[0]))],
     ));
+    // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
+    if size(&dictionary.load(j)) < 1e-9 {
+        let widths = WIDTHS.map(|share| share * travel);
+        all.push(
+            Family::fixed("cable_hysteresis", &[j], "play of many widths", TRANSMISSION, &[Bound::Free; WIDTHS.len()], move |d| {
+                widths.iter().map(|width| d.deflection_of(j, lag(d, j, *width))).collect()
+            })
+            .penalised(3.0),
+        );
+    }
     let usual = size(&dictionary.load(j)).max(1e-9);
     all.push(Family::shaped(
         "backlash",
