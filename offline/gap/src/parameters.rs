@@ -81,7 +81,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("cable_stretch", _) => vec![named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0])],
         ("cable_hysteresis", "play of many widths") => {
             // Share that follows without memory; the width that the others have on average.
-            let lost: f64 = theta.iter().sum();
+            let lost: f64 = theta[..theta.len() - 2].iter().sum();
             vec![named("a", "1", (1.0 - lost).clamp(0.0, 1.0))]
         }
         ("cable_hysteresis", _) => vec![

@@ -7,7 +7,9 @@ use crate::problem::Channel;
 /// Widths of play, shares of a joint's travel.
 const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.012, 0.018, 0.027, 0.04, 0.06, 0.09, 0.14];
 /// Widths of play that stand beside each other, shares of a joint's travel.
-const WIDTHS: [f64; 6] = [0.01, 0.03, 0.08, 0.2, 0.4, 0.7];
+const WIDTHS: [f64; 12] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
+/// The same for the motion of another joint.
+const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// Shares of the straight spring in a Bouc-Wen element.
@@ -49,12 +51,10 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
     if size(&dictionary.load(j)) < 1e-9 {
         let widths = WIDTHS.map(|share| share * travel);
-        all.push(
-            Family::fixed("cable_hysteresis", &[j], "play of many widths", TRANSMISSION, &[Bound::Free; WIDTHS.len()], move |d| {
-                widths.iter().map(|width| d.deflection_of(j, lag(d, j, *width))).collect()
-            })
-            .penalised(3.0),
-        );
+        let family = Family::fixed("cable_hysteresis", &[j], "play of many widths", TRANSMISSION, &[Bound::Free; WIDTHS.len() + 2], move |d| {
+            widths.iter().map(|width| d.deflection_of(j, lag(d, j, *width))).chain([d.deflection_of(j, minus(&position(d, j))), offset(d, j)]).collect()
+        });
+        all.push(family.penalised(3.0));
     }
     let usual = size(&dictionary.load(j)).max(1e-9);
     all.push(Family::shaped(
@@ -210,6 +210,8 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         .penalised(1.5),
     );
     let travel = dictionary.travel(j);
+    // A bend in points that a camera saw is mostly play or the camera.
+    let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
     let (from, to, count) = PERIODS;
     let periods: Vec<f64> = (0..count).map(|k| travel * from * (to / from).powf(k as f64 / (count - 1) as f64)).collect();
     all.push(
@@ -219,7 +221,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let wave = |phase: f64| q.iter().map(|q| -(std::f64::consts::TAU * q / s[0] + phase).sin()).collect();
             vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
         })
-        .penalised(2.0),
+        .penalised(2.0 + unlikely),
     );
 }
 
@@ -235,6 +237,17 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             })
             .penalised(1.5),
         );
+        if size(&dictionary.load(j)) < 1e-9 {
+            // What the other joint drags along comes late where its cable has play.
+            let widths = COUPLED_WIDTHS.map(|share| share * dictionary.travel(i));
+            let mut bounds = vec![small];
+            bounds.resize(2 + widths.len(), Bound::Free);
+            let family = Family::fixed("joint_coupling", &pair, "position, with play", TRANSMISSION, &bounds, move |d| {
+                let late = widths.iter().map(|width| d.deflection_of(j, lag(d, i, *width)));
+                std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
+            });
+            all.push(family.penalised(4.0));
+        }
         all.push(Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
             // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
             let mut column = coupled(d);

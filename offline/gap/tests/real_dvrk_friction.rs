@@ -1,0 +1,25 @@
+//! Friction tests of a real da Vinci insertion axis (`data/dvrk-friction`).
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{parameter, primary, report};
+
+#[test]
+fn an_axis_at_constant_velocities_shows_dry_friction_and_no_stribeck_curve() {
+    let Some(report) = report("examples/dvrk-psm.toml", &["dvrk-friction/insertion_constvel_up.csv"], &[]) else { return };
+    let found = primary(&report, "coulomb_friction");
+    assert_eq!(found.iter().map(|v| v.location.joint.join("")).collect::<Vec<_>>(), ["insertion"]);
+    assert!(primary(&report, "stribeck_friction").is_empty());
+}
+
+#[test]
+fn break_away_gives_the_static_level_with_an_interval() {
+    for run in ["insertion_breakaway_psm1", "insertion_breakaway_psm2_a"] {
+        let Some(report) = report("examples/dvrk-psm.toml", &[&format!("dvrk-friction/{run}.csv")], &[]) else { return };
+        let found = primary(&report, "coulomb_friction");
+        let verdict = found.iter().find(|v| v.location.joint == ["insertion"]).expect("dry friction of the insertion");
+        let (level, [low, high]) = parameter(verdict, "f_c");
+        assert!(low < level && level < high && (0.3..1.5).contains(&level), "{run}: {level} N ({low} to {high})");
+    }
+}
