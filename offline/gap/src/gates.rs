@@ -16,6 +16,7 @@ pub fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     for (real, sim) in runs {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
+        all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
         }

@@ -19,6 +19,7 @@ pub mod score;
 pub mod search;
 
 pub mod analysis;
+mod breakaway;
 mod corrected;
 mod experiment;
 mod gates;

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{parameter, primary, report};
+use common::{primary, report};
 
 #[test]
 fn an_axis_at_constant_velocities_shows_dry_friction_and_no_stribeck_curve() {
@@ -17,9 +17,9 @@ fn an_axis_at_constant_velocities_shows_dry_friction_and_no_stribeck_curve() {
 fn break_away_gives_the_static_level_with_an_interval() {
     for run in ["insertion_breakaway_psm1", "insertion_breakaway_psm2_a"] {
         let Some(report) = report("examples/dvrk-psm.toml", &[&format!("dvrk-friction/{run}.csv")], &[]) else { return };
-        let found = primary(&report, "coulomb_friction");
-        let verdict = found.iter().find(|v| v.location.joint == ["insertion"]).expect("dry friction of the insertion");
-        let (level, [low, high]) = parameter(verdict, "f_c");
-        assert!(low < level && level < high && (0.3..1.5).contains(&level), "{run}: {level} N ({low} to {high})");
+        let found = report.data_quality.iter().find(|q| q.check == "break_away" && q.message.starts_with("insertion")).expect("a level");
+        println!("{run}: {}", found.message);
+        // Coulomb friction of the insertion from its other runs: 0.57 to 0.80 N.
+        assert!(found.value.is_some_and(|level| (0.4..1.2).contains(&level)), "{}", found.message);
     }
 }
