@@ -157,7 +157,7 @@ pub fn analyse(model: &RobotModel, given: &[Given], options: &Options, progress:
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
         return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
     }
-    let band = if from_recording { Band::LEARNT } else { Band::SLOW };
+    let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0) };
     let (train, held) = split(&runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
     if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {

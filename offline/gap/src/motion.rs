@@ -20,10 +20,25 @@ impl Band {
     /// What a model learnt from another recording can follow: half power at 2.7 Hz.
     pub const LEARNT: Self = Self { sigma_s: 0.05, step_s: 0.02 };
 
+    /// Fast motion: half power at 67 Hz, every row.
+    pub const FAST: Self = Self { sigma_s: 0.002, step_s: 0.002 };
+
+    /// The band in which a run moves: the slow one, unless most of its motion is faster.
+    pub fn of(run: &Run) -> Self {
+        let lost = |series: &[f64]| {
+            let quick = Window::new(Self::FAST.sigma_s.max(1.5 * run.dt_s), run.dt_s).apply(series, 0);
+            let slow = Window::new(Self::SLOW.sigma_s, run.dt_s).apply(series, 0);
+            let mean = crate::nominal::mean(series);
+            let size = |x: &mut dyn Iterator<Item = f64>| crate::nominal::rms(x);
+            size(&mut quick.iter().zip(&slow).map(|(q, s)| q - s)) > 0.7 * size(&mut quick.iter().map(|q| q - mean))
+        };
+        if !run.points && run.position.iter().all(|series| lost(series)) { Self::FAST } else { Self::SLOW }
+    }
+
     /// The same for a recording with a period of `dt_s`.
     #[must_use]
     pub fn for_period(self, dt_s: f64) -> Self {
-        Self { sigma_s: self.sigma_s.max(0.5 * dt_s), step_s: self.step_s.max(dt_s) }
+        Self { sigma_s: self.sigma_s.max(if self == Self::FAST { 1.5 * dt_s } else { 0.5 * dt_s }), step_s: self.step_s.max(dt_s) }
     }
 }
 

@@ -252,7 +252,11 @@ impl<'a> Evaluator<'a> {
                 rotor * run.drive_acceleration[j][i] + viscous * run.drive_velocity[j][i] + constant
             })
             .collect();
-        let spring = |j: usize| dot(&self.nominal.springs[j], &powers(state.position[j]));
+        let spring = |j: usize| {
+            let [stiffness, damping, rest] = self.robot.drives[j].ground;
+            let ground = stiffness * (state.position[j] - rest) + damping * state.velocity[j];
+            ground + dot(&self.nominal.springs[j], &powers(state.position[j]))
+        };
         let motor = (0..n).map(|j| link[j] + spring(j) + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
         Load { link, motor }
     }

@@ -8,6 +8,8 @@ use crate::hypothesis::{Candidate, Dictionary, Family};
 const HALVINGS: usize = 7;
 /// Times that secants are drawn to the last coefficients.
 const SECANTS: usize = 4;
+/// The same of a memory of the whole motion.
+const SHARP_ROUNDS: usize = 10;
 /// Rounds over all numbers of a shape.
 const ROUNDS: usize = 2;
 
@@ -43,11 +45,12 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
         least = misfit(&best);
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
-    let rounds = if free.len() + usize::from(best.onset_s.is_some()) > 1 { ROUNDS } else { 1 };
+    // Sharp and long valleys: memories that the motion shows in every sample.
+    let rounds = if family.form == "to the ground" { SHARP_ROUNDS } else if free.len() + usize::from(best.onset_s.is_some()) > 1 { ROUNDS } else { 1 };
     for _ in 0..rounds {
         for &k in &free {
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
-            for _ in 0..HALVINGS {
+            for _ in 0..HALVINGS + if rounds == SHARP_ROUNDS { 5 } else { 0 } {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
                     // A positive number of a grid stays one.

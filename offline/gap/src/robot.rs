@@ -19,11 +19,13 @@ pub struct DriveNominal {
     pub torque_per_count: f64,
     /// Joint position where the motor stands at 0.
     pub offset: f64,
+    /// Spring from the joint to the ground: stiffness, damping, rest position.
+    pub ground: [f64; 3],
 }
 
 impl Default for DriveNominal {
     fn default() -> Self {
-        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY, torque_per_count: 0.0, offset: 0.0 }
+        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY, torque_per_count: 0.0, offset: 0.0, ground: [0.0; 3] }
     }
 }
 
@@ -76,7 +78,8 @@ impl Robot {
         let n = model.joint_count().min(arm.joint_count());
         let a = model.motor_from_joint();
         let motor_from_joint = DMatrix::from_fn(n, n, |i, j| a[i][j]);
-        let drives = model.drives().into_iter().take(n).map(|drive| {
+        let passive = model.passive();
+        let drives = model.drives().into_iter().zip(passive).take(n).map(|(drive, passive)| {
             let reduction = drive.reduction;
             DriveNominal {
                 rotor_inertia: drive.rotor_inertia_kg_m2 * reduction * reduction,
@@ -85,6 +88,7 @@ impl Robot {
                 stiffness: if drive.connection == Connection::Cable { drive.stiffness } else { f64::INFINITY },
                 torque_per_count: drive.torque_per_count_nm(),
                 offset: drive.offset,
+                ground: [passive.stiffness, passive.damping, passive.rest],
             }
         });
         let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m, name: site.name.clone() });

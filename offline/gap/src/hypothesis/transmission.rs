@@ -25,6 +25,11 @@ const TRANSMISSION: Channel = Channel::Transmission;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let problem = dictionary.problem;
+    for j in 0..dictionary.joints() {
+        if problem.robot.drives[j].ground[0] > 0.0 && problem.cell(Channel::JointTorque, j).is_some() {
+            push_ground(dictionary, j, all);
+        }
+    }
     if !problem.has(TRANSMISSION) && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
         return;
     }
@@ -160,6 +165,56 @@ fn per_run(dictionary: &Dictionary, series: &[f64], memory: impl Fn(&[f64]) -> V
         start = end;
     }
     out
+}
+
+/// Bends of a spring to the ground, over one deflection: those that depend on the way, and those that turn with it, over the first.
+const BENDS: [f64; 3] = [0.15, 0.5, 1.5];
+const TURNS: [f64; 6] = [-4.0, -1.5, -0.5, 0.5, 1.5, 4.0];
+
+/// A spring to the ground whose force has a memory: `k_0 y + k_1 z`, `zd = yd - (p |yd| z + q yd |z|)`.
+fn push_ground(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let usual = size(&position(dictionary, j)).max(1e-12);
+    let family = Family::shaped(
+        "cable_hysteresis",
+        &[j],
+        "to the ground",
+        Channel::JointTorque,
+        &[Bound::Positive, Bound::Free],
+        &[("p", true), ("q_over_p", true)],
+        product(&[&BENDS.map(|b| b / usual), &TURNS]),
+        move |d, s| {
+            let memory = d.smoothed(|r| remembered(&d.problem.pairs[r].real.run.position[j], s[0], s[0] * s[1]));
+            vec![d.effort_of(j, memory, false), d.effort_of(j, position(d, j), false)]
+        },
+    );
+    all.push(family.penalised(3.0));
+}
+
+/// Memory of a deflection, by midpoints in steps between the samples, where the deflection is a cubic; the first samples are
+/// gone through twice, there and back, so that it has settled.
+fn remembered(deflection: &[f64], p: f64, q: f64) -> Vec<f64> {
+    const PARTS: usize = 8;
+    let settle = deflection.len().min(400);
+    let series: Vec<f64> = deflection[..settle].iter().rev().chain(deflection).copied().collect();
+    let at = |i: usize| series[i.min(series.len() - 1)];
+    let mut z = 0.0_f64;
+    let mut out = vec![0.0];
+    for i in 1..series.len() {
+        let (a, b, c, d) = (at(i.saturating_sub(2)), at(i - 1), at(i), at(i + 1));
+        let (from, to) = (0.5 * (c - a), 0.5 * (d - b));
+        let cubic = |t: f64| b + t * (from + t * (3.0 * (c - b) - 2.0 * from - to + t * (2.0 * (b - c) + from + to)));
+        let mut before = b;
+        for part in 1..=PARTS {
+            let now = cubic(part as f64 / PARTS as f64);
+            let step = now - before;
+            before = now;
+            let slope = |z: f64| step - (p * step.abs() * z + q * step * z.abs());
+            let half = z + 0.5 * slope(z);
+            z += slope(half);
+        }
+        out.push(z);
+    }
+    out.split_off(settle)
 }
 
 /// Deflection times stiffness of a Bouc-Wen element (n = 1, g = 0.5) under a load, where `load = a x + (1 - a) z`.
