@@ -278,7 +278,10 @@ impl Clock {
     fn new(time: &[f64]) -> Self {
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
-        let dt_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+        let median = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+        // Times are rounded: where no sample is missing, the mean step says more than any one of them.
+        let even = steps.first().zip(steps.last()).is_some_and(|(least, most)| *least > 0.75 * median && *most < 1.25 * median);
+        let dt_s = if even { (time[time.len() - 1] - time[0]) / steps.len() as f64 } else { median };
         let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
         let count = (span / dt_s).round() as usize + 1;
         let uniform = count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
