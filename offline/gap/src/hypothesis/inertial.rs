@@ -56,7 +56,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         .penalised(3.0),
     );
     // The links of one robot are the same in two recordings of it.
-    let altered = if dictionary.problem.from_recording { 20.0 } else { 0.0 };
+    let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
         let parameters = robot.arm.link_inertia(link).parameters();
         if parameters.iter().any(|x| *x != 0.0) {
