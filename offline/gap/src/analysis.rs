@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use gap_report::{DataQuality, Level, Pictures, Report};
+use gap_report::{DataQuality, Fit, Level, Pictures, Report, Status};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
@@ -13,7 +13,7 @@ use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
-use crate::run::{Run, RunError, alike, common};
+use crate::run::{Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Thresholds, search};
 use crate::{builtin, corrected, flexible, verdicts};
 
@@ -112,10 +112,21 @@ const HELD_OUT: f64 = 1.0 / 3.0;
 const BLOCK_S: f64 = 1.5;
 /// Most blocks.
 const BLOCKS: f64 = 40.0;
+/// Most effects of a table of points.
+const MOST_OF_POINTS: usize = 9;
+/// Times the noise floor that may be left of held-out runs where a robot's own numbers are taken at their word,
+const FLOOR: f64 = 2.0;
+/// or share of the removable error that has to be gone.
+const REMOVED: f64 = 0.95;
+/// Share of its torque that the model of a simulator leaves; real robots leave a tenth and more.
+const OF_A_MODEL: f64 = 0.05;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
 /// Runs the whole analysis.
+///
+/// Where no simulation is given, the robot's own numbers are taken at their word first. If something is left that they and the
+/// library do not explain, they are believed but roughly: a lab's numbers of a real robot are.
 ///
 /// # Errors
 /// [`AnalysisError`] where there is nothing to compare; everything else ends in a report.
@@ -125,21 +136,62 @@ pub fn analyse(
     options: &Options,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
+    let at_its_word = analyse_with(model, given, options, true, progress)?;
+    if given.iter().any(|one| one.sim.is_some()) || reaches_floor(&at_its_word.report) {
+        return Ok(at_its_word);
+    }
+    progress("the robot's numbers, believed roughly");
+    let roughly = analyse_with(model, given, options, false, progress)?;
+    let unexplained = |outcome: &Outcome| match outcome.report.status {
+        Status::NoMismatch | Status::Explained | Status::InsufficientData => 0,
+        Status::PartlyExplained => 1,
+        Status::Unmodelled => 2,
+    };
+    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1);
+    Ok(if better { roughly } else { at_its_word })
+}
+
+/// Does hardly anything but noise remain?
+fn reaches_floor(report: &Report) -> bool {
+    let reached = |fit: &Fit| {
+        fit.removed_fraction.is_some_and(|removed| removed > REMOVED)
+            || fit.noise_floor.is_some_and(|floor| fit.after <= FLOOR * floor)
+    };
+    match report.status {
+        Status::NoMismatch | Status::InsufficientData => true,
+        Status::Explained => report.verdicts.iter().flat_map(|v| &v.fit).all(reached),
+        Status::PartlyExplained | Status::Unmodelled => false,
+    }
+}
+
+fn analyse_with(
+    model: &RobotModel,
+    given: &[Given],
+    options: &Options,
+    at_its_word: bool,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Outcome, AnalysisError> {
     let begun = Instant::now();
     let robot = Robot::of(model);
     progress("reading the runs");
     let mut runs = Vec::new();
     // Simulations that move otherwise, or at another time, than the recording.
     let mut apart: Vec<Run> = Vec::new();
+    let mut from_recording = false;
     for one in given {
         let real = Run::new(&one.real, &robot)?;
         let sim = match &one.sim {
             Some((sim, _)) => Some(Run::new(sim, &robot)?),
-            None => builtin::simulated(model, &one.real).and_then(|sim| Run::new(&sim, &robot).ok()),
+            None if at_its_word => builtin::simulated(model, &one.real).and_then(|sim| Run::new(&sim, &robot).ok()),
+            None => None,
         };
+        let of_robot = |real: &Run, sim: &Run| one.sim.is_some() && as_noisy(real, sim) && !of_a_model(&robot, sim);
         runs.push(match sim {
             Some(sim) => {
-                if !alike(&real, &sim) {
+                // One as noisy as the recording is a recording of its own, whose noise would only be added.
+                let recorded = of_robot(&real, &sim);
+                from_recording |= recorded;
+                if recorded || !alike(&real, &sim) {
                     apart.push(sim.clone());
                 }
                 // Of another rate: another run of its own, which says what to believe, and no more.
@@ -167,13 +219,14 @@ pub fn analyse(
     }
     // With torques of their own they say what to believe of the robot, but not sample by sample.
     let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
+    let from_recording = from_recording && !apart.is_empty();
     if !apart.is_empty() {
         runs.iter_mut().for_each(|run| run.1 = None);
     }
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
         return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
     }
-    let band = Band::SLOW;
+    let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0) };
     let (train, held) = split(&runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
     if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {
@@ -195,17 +248,25 @@ pub fn analyse(
     progress("learning what the simulator believes");
     let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
     sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
-    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn(&robot, &sims) };
+    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn_with(&robot, &sims, from_recording) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
-    let problem = if sims.is_empty() { problem.believed_roughly() } else { problem };
+    let prior = match (sims.is_empty(), from_recording) {
+        (true, _) => Prior::Believed,
+        (false, true) => Prior::Drifting,
+        (false, false) => Prior::Exact,
+    };
+    let problem = prior.put_on(problem);
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
-    let mut answer = search(&problem, &dictionary, &options.thresholds, &mut |line| {
+    // Points have offset, play and coupling on every joint, and nothing else.
+    let points = train.iter().all(|pair| pair.real.run.points);
+    let thresholds = Thresholds { effects: if points { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
+    let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
         if options.trace {
             eprintln!("{line}");
         }
@@ -215,11 +276,12 @@ pub fn analyse(
     let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
-    let unmodelled = beyond > 2.0 * options.thresholds.nats
+    let unmodelled = beyond_recording(&problem, &answer, &ceiling)
+        && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
     let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
-    let held_problem = if sims.is_empty() { held_problem.believed_roughly() } else { held_problem };
+    let held_problem = prior.put_on(held_problem);
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
     let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
@@ -246,6 +308,42 @@ pub fn analyse(
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
     outcome.report.timing.threads = Some(2);
     Ok(outcome)
+}
+
+/// Is the torque of a run that of rigid bodies with drives, as a simulator's is but for its noise?
+fn of_a_model(robot: &Robot, sim: &Run) -> bool {
+    let motion = Motion::new(sim.clone(), Band::of(sim));
+    let nominal = Nominal::learn(robot, std::slice::from_ref(&motion));
+    let shares = nominal.torque_error.iter().zip(&nominal.usual_torque).map(|(left, usual)| left / usual.max(1e-12));
+    2 * shares.filter(|share| *share > OF_A_MODEL).count() <= robot.joint_count()
+}
+
+/// How far the nominal model is to be trusted.
+#[derive(Debug, Clone, Copy)]
+enum Prior {
+    /// The lab's own numbers, which no simulation has shown.
+    Believed,
+    /// Learnt from another recording.
+    Drifting,
+    /// Learnt from a simulation.
+    Exact,
+}
+
+impl Prior {
+    fn put_on<'a>(self, problem: Problem<'a>) -> Problem<'a> {
+        match self {
+            Self::Believed => problem.believed_roughly(),
+            Self::Drifting => problem.learnt_from_recording(),
+            Self::Exact => problem,
+        }
+    }
+}
+
+/// Is what the effects leave, where the ceiling gains most, more than the nominal model leaves of the robot that it knows?
+fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceiling) -> bool {
+    let Some((c, _)) = ceiling.cell else { return true };
+    let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
+    !problem.from_recording || within.sqrt() > problem.practical[c]
 }
 
 fn too_short(seconds: f64) -> DataQuality {

@@ -8,7 +8,7 @@ use crate::hypothesis::{Candidate, normals};
 use crate::intervals::Estimate;
 
 /// Text of corrected.toml: the given model, what the simulator was learnt to believe, and the effects that were found.
-pub fn model(given: &RobotModel, found: &Found, learnt: bool) -> String {
+pub(crate) fn model(given: &RobotModel, found: &Found, learnt: bool) -> String {
     let mut model = given.clone();
     if learnt {
         believe(&mut model, found);
@@ -53,6 +53,18 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Optio
     let numbers: Vec<(&str, f64)> = estimate.parameters.iter().map(|(named, _)| (named.name, named.value)).collect();
     let mut parameters = Parameters::of(&numbers);
     let bound = match family.physics {
+        "payload" if candidate.shape_of("link").is_some_and(|link| link as usize + 1 < found.robot.joint_count()) => {
+            // A weight on another link than the last one: what it adds to that link.
+            let place = nalgebra::Vector3::from(["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(0.0)));
+            let added = arm::serial::LinkInertia::point(estimate.coefficients[0], place).parameters();
+            parameters = Parameters::of(&[]);
+            let _ = parameters.0.insert("dpi_B".to_owned(), Value::Vector(added.to_vec()));
+            let link = candidate.shape_of("link")? as usize;
+            return Physics::new("link_inertia", &parameters)?.ok().map(|physics| Effect {
+                source: Some(format!("ravenpose gap (payload {})", family.form)),
+                ..Effect::new(physics, Bound::Link(link))
+            });
+        }
         "joint_coupling" => Bound::Pair(family.joints[0], family.joints[1]),
         "link_inertia" => {
             let change = link_change(found, candidate, &estimate.coefficients)?;

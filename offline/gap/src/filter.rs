@@ -30,6 +30,11 @@ impl Window {
         Self { half, weights: [smooth, first, curve] }
     }
 
+    /// No smoothing, no derivatives: for points without a clock.
+    pub fn identity() -> Self {
+        Self { half: 0, weights: [vec![1.0], vec![0.0], vec![0.0]] }
+    }
+
     /// Samples at each end of a series whose result leans on samples that do not exist.
     pub fn margin(&self) -> usize {
         self.half

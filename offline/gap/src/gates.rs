@@ -19,6 +19,7 @@ pub(crate) fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuali
         all.extend(standing(robot, real));
         all.extend(repeated(real));
         all.extend(gaps(real));
+        all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
         }

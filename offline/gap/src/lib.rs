@@ -19,6 +19,7 @@ pub mod score;
 pub mod search;
 
 pub mod analysis;
+mod breakaway;
 pub mod builtin;
 mod corrected;
 mod experiment;

@@ -17,10 +17,28 @@ impl Band {
     /// motor and link apart, and stepped encoders rattle.
     pub const SLOW: Self = Self { sigma_s: 0.012, step_s: 0.02 };
 
+    /// What a model learnt from another recording can follow: half power at 2.7 Hz.
+    pub const LEARNT: Self = Self { sigma_s: 0.05, step_s: 0.02 };
+
+    /// Fast motion: half power at 67 Hz, every row.
+    pub const FAST: Self = Self { sigma_s: 0.002, step_s: 0.002 };
+
+    /// The band in which a run moves: the slow one, unless most of its motion is faster.
+    pub fn of(run: &Run) -> Self {
+        let lost = |series: &[f64]| {
+            let quick = Window::new(Self::FAST.sigma_s.max(1.5 * run.dt_s), run.dt_s).apply(series, 0);
+            let slow = Window::new(Self::SLOW.sigma_s, run.dt_s).apply(series, 0);
+            let mean = crate::nominal::mean(series);
+            let size = |x: &mut dyn Iterator<Item = f64>| crate::nominal::rms(x);
+            size(&mut quick.iter().zip(&slow).map(|(q, s)| q - s)) > 0.7 * size(&mut quick.iter().map(|q| q - mean))
+        };
+        if !run.points && run.position.iter().all(|series| lost(series)) { Self::FAST } else { Self::SLOW }
+    }
+
     /// The same for a recording with a period of `dt_s`.
     #[must_use]
     pub fn for_period(self, dt_s: f64) -> Self {
-        Self { sigma_s: self.sigma_s.max(0.5 * dt_s), step_s: self.step_s.max(dt_s) }
+        Self { sigma_s: self.sigma_s.max(if self == Self::FAST { 1.5 * dt_s } else { 0.5 * dt_s }), step_s: self.step_s.max(dt_s) }
     }
 }
 
@@ -63,14 +81,15 @@ impl Motion {
     /// Smooths a run.
     pub fn new(run: Run, band: Band) -> Self {
         let band = band.for_period(run.dt_s);
-        let window = Window::new(band.sigma_s, run.dt_s);
+        let over = |sigma_s: f64| if run.points { Window::identity() } else { Window::new(sigma_s, run.dt_s) };
+        let window = over(band.sigma_s);
         let smooth = |set: &[Vec<f64>], derivative: usize| set.iter().map(|s| window.apply(s, derivative)).collect::<Vec<_>>();
-        let quick = Window::new(QUICK_SIGMA_S.min(band.sigma_s), run.dt_s);
+        let quick = over(QUICK_SIGMA_S.min(band.sigma_s));
         let deflection: Option<Vec<Vec<f64>>> = run
             .truth
             .as_ref()
             .map(|truth| run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect());
-        let slow = Window::new(DEFLECTION_SIGMA_S.max(band.sigma_s), run.dt_s);
+        let slow = over(DEFLECTION_SIGMA_S.max(band.sigma_s));
         let margin = window.margin();
         let step = ((band.step_s / run.dt_s).round() as usize).max(1);
         let usable = margin..run.len().saturating_sub(margin);
@@ -158,6 +177,7 @@ mod tests {
             id: String::new(),
             start_s: 0.0,
             dt_s: 0.001,
+            points: false,
             position: vec![series.clone()],
             drive: vec![series.clone()],
             torque: None,

@@ -12,6 +12,8 @@ const DRIVE_COLUMNS: usize = 4;
 
 /// Rounds between torque and deflection.
 const ROUNDS: usize = 2;
+/// Powers of a joint's own position with which springs and cables may pull.
+const SPRINGS: usize = 3;
 
 /// A nominal model.
 #[derive(Debug, Clone)]
@@ -22,6 +24,11 @@ pub struct Nominal {
     pub drives: Vec<[f64; DRIVE_COLUMNS]>,
     /// Per joint: compliance of the transmission (rad per N·m or m per N) and constant deflection.
     pub compliance: Vec<[f64; 2]>,
+    /// Per joint: what springs and cables pull with the first, second and third power of its position. All 0 but where the
+    /// model was learnt from a recording.
+    pub springs: Vec<[f64; SPRINGS]>,
+    /// RMS of the torque of the runs that it was learnt from, per joint; 0 where nothing was learnt.
+    pub usual_torque: Vec<f64>,
     /// RMS of what the model leaves of the simulation's own torque, per joint; 0 where nothing was learnt.
     pub torque_error: Vec<f64>,
 }
@@ -46,6 +53,8 @@ impl Nominal {
             inertial,
             drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
             compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
+            springs: vec![[0.0; SPRINGS]; n],
+            usual_torque: vec![0.0; n],
             torque_error: vec![0.0; n],
         }
     }
@@ -55,18 +64,24 @@ impl Nominal {
     /// Torque alone does not tell the cable's load where friction is many times larger (a light tool on a stiff drive); the
     /// simulator's own deflection does, so both are fitted together, the compliance first from the robot's own weights.
     pub fn learn(robot: &Robot, runs: &[Motion]) -> Self {
+        Self::learn_with(robot, runs, false)
+    }
+
+    /// The same, of a robot that may have springs and cables which no simulator has.
+    pub fn learn_with(robot: &Robot, runs: &[Motion], springs: bool) -> Self {
         let mut nominal = Self::of(robot);
         for _ in 0..ROUNDS {
             nominal.learn_deflection(robot, runs);
-            nominal.learn_torque(robot, runs);
+            nominal.learn_torque(robot, runs, springs);
         }
         nominal.learn_deflection(robot, runs);
         nominal
     }
 
-    fn learn_torque(&mut self, robot: &Robot, runs: &[Motion]) {
+    fn learn_torque(&mut self, robot: &Robot, runs: &[Motion], springs: bool) {
         let n = robot.joint_count();
-        let (links, width) = (PARAMETERS * n, PARAMETERS * n + DRIVE_COLUMNS * n);
+        let (links, sprung) = (PARAMETERS * n, (PARAMETERS + DRIVE_COLUMNS) * n);
+        let width = sprung + if springs { SPRINGS * n } else { 0 };
         let rows: usize = runs.iter().filter(|run| run.torque.is_some()).map(|run| run.rows.len()).sum();
         if rows < 4 * width {
             return;
@@ -121,6 +136,9 @@ impl Nominal {
                         let carried = drive.map(|x| coupling[(d, j)] * x);
                         row[links + DRIVE_COLUMNS * d..][..DRIVE_COLUMNS].copy_from_slice(&carried);
                     }
+                    if springs {
+                        row[sprung + SPRINGS * j..][..SPRINGS].copy_from_slice(&powers(state.position[j]));
+                    }
                     add(&mut gram, &mut right, &row, torque[j][i], 1.0 / torque_scale[j].max(1e-12));
                 }
             }
@@ -141,17 +159,22 @@ impl Nominal {
                 right[PARAMETERS * link + k] += 10.0 * own[k] / spread.max(1e-4).powi(2);
             }
         }
-        for j in 0..n {
-            for k in 0..DRIVE_COLUMNS {
-                let place = links + DRIVE_COLUMNS * j + k;
-                gram[(place, place)] *= 1.0 + 1e-9;
-            }
+        for place in links..sprung {
+            gram[(place, place)] *= 1.0 + 1e-9;
+        }
+        // Small powers pass for each other.
+        for place in sprung..width {
+            gram[(place, place)] *= 1.0 + 1e-4;
         }
         solve(&mut gram, &mut right);
         self.inertial.copy_from_slice(&right.as_slice()[..links]);
         for j in 0..n {
             self.drives[j].copy_from_slice(&right.as_slice()[links + DRIVE_COLUMNS * j..][..DRIVE_COLUMNS]);
         }
+        for j in (0..n).filter(|_| springs) {
+            self.springs[j].copy_from_slice(&right.as_slice()[sprung + SPRINGS * j..][..SPRINGS]);
+        }
+        self.usual_torque = torque_scale.iter().map(|s| s / 0.05).collect();
         self.torque_error = self.torque_left(robot, runs);
     }
 
@@ -253,9 +276,20 @@ impl<'a> Evaluator<'a> {
                 rotor * run.drive_acceleration[j][i] + viscous * run.drive_velocity[j][i] + constant
             })
             .collect();
-        let motor = (0..n).map(|j| link[j] + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
+        let spring = |j: usize| {
+            let [stiffness, damping, rest] = self.robot.drives[j].ground;
+            let ground = stiffness * (state.position[j] - rest) + damping * state.velocity[j];
+            ground + dot(&self.nominal.springs[j], &powers(state.position[j]))
+        };
+        let motor =
+            (0..n).map(|j| link[j] + spring(j) + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
         Load { link, motor }
     }
+}
+
+/// First to third power.
+fn powers(q: f64) -> [f64; SPRINGS] {
+    [q, q * q, q * q * q]
 }
 
 /// Smoothed sign of a joint's velocity.

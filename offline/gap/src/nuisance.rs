@@ -7,7 +7,8 @@
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
-use crate::nominal::rms;
+use crate::motion::Motion;
+use crate::nominal::{rms, sign_series};
 use crate::problem::{Channel, Problem};
 
 /// Columns of one cell, each for one standard deviation of what is believed.
@@ -147,6 +148,70 @@ pub fn believed(problem: &Problem) -> Vec<Nuisance> {
         let inertia = if rotor > 0.0 { 0.5 * rotor } else { 0.1 * usual / rms(acceleration.iter().copied()).max(1e-12) };
         all[c].push(acceleration.into_iter().map(|a| inertia * a).collect(), false);
         all[c].push(vec![BELIEF * usual; cell.rows.len()], false);
+    }
+    // What measures the joints stands anew for every run.
+    let runs = problem.pairs.len();
+    for (c, cell) in problem.cells.iter().enumerate().filter(|(_, cell)| runs > 1 && cell.channel == Channel::Transmission) {
+        let size = rms(cell.residual.iter().copied());
+        for run in 0..runs {
+            let mean = 1.0 / runs as f64;
+            let of = |&(r, _): &(usize, usize)| size * (f64::from(u8::from(r == run)) - mean);
+            all[c].push(cell.rows.iter().map(of).collect(), true);
+        }
+    }
+    all
+}
+
+/// Shares of what was learnt by which friction, rotor and zero point of a drive differ from one day to the next.
+const FRICTION_DRIFT: f64 = 0.4;
+/// The same, of the usual torque.
+const FRICTION_SHARE: f64 = 0.15;
+const ZERO_DRIFT: f64 = 0.15;
+/// The same of a drive's inertia, of all that it moves.
+const INERTIA_DRIFT: f64 = 0.1;
+
+/// Travel over which dry friction may turn round, shares of a joint's travel.
+const TURNING: [f64; 3] = [0.003, 0.012, 0.05];
+
+/// Sign of the motion that turns round over a share of the travel (Dahl), smoothed.
+fn turning(motion: &Motion, j: usize, share: f64) -> Vec<f64> {
+    let (low, high) = motion.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let travel = (share * (high - low)).max(1e-12);
+    let mut state = 0.0;
+    let raw: Vec<f64> = motion.quick_velocity[j]
+        .iter()
+        .map(|v| {
+            let limit = if *v == 0.0 { state } else { v.signum() };
+            state = limit + (state - limit) * (-(v * motion.run.dt_s / travel).abs()).exp();
+            state
+        })
+        .collect();
+    motion.window.apply(&raw, 0)
+}
+
+/// Nuisances of every cell of a model that was learnt from another recording: friction, constants.
+pub fn drifting(problem: &Problem) -> Vec<Nuisance> {
+    let mut all = vec![Nuisance::default(); problem.cells.len()];
+    for j in 0..problem.robot.joint_count() {
+        let Some(c) = problem.cell(Channel::JointTorque, j) else { continue };
+        let cell = &problem.cells[c];
+        let [_, viscous, coulomb, _] = problem.nominal.drives[j];
+        let signs: Vec<Vec<f64>> = problem.pairs.iter().map(|pair| sign_series(&pair.real, j)).collect();
+        let usual = problem.nominal.usual_torque[j];
+        let dry = (FRICTION_DRIFT * coulomb).max(FRICTION_SHARE * usual);
+        all[c].push(cell.rows.iter().map(|&(r, i)| dry * signs[r][i]).collect(), false);
+        for share in TURNING {
+            let turned: Vec<Vec<f64>> = problem.pairs.iter().map(|pair| turning(&pair.real, j, share)).collect();
+            all[c].push(cell.rows.iter().map(|&(r, i)| dry * turned[r][i]).collect(), false);
+        }
+        let velocity: Vec<f64> = cell.rows.iter().map(|&(r, i)| problem.pairs[r].real.drive_velocity[j][i]).collect();
+        let wet = (FRICTION_DRIFT * viscous).max(FRICTION_SHARE * usual / rms(velocity.iter().copied()).max(1e-12));
+        all[c].push(velocity.into_iter().map(|v| wet * v).collect(), false);
+        all[c].push(vec![ZERO_DRIFT * usual; cell.rows.len()], false);
+        // An elastic drive at another pace seems to have another inertia.
+        let acceleration: Vec<f64> = cell.rows.iter().map(|&(r, i)| problem.pairs[r].real.drive_acceleration[j][i]).collect();
+        let inertia = INERTIA_DRIFT * usual / rms(acceleration.iter().copied()).max(1e-12);
+        all[c].push(acceleration.into_iter().map(|a| inertia * a).collect(), false);
     }
     all
 }

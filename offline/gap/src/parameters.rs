@@ -81,6 +81,22 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("backlash", "follows the motion") => vec![named("b", position, shaped("b"))],
         ("backlash", _) => vec![named("b", position, theta[0])],
         ("cable_stretch", _) => vec![named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0])],
+        ("cable_hysteresis", "to the ground") => {
+            let (p, q) = (shaped("p"), shaped("p") * shaped("q_over_p"));
+            let stiffness = robot.drives[joint].ground[0] + theta[0] + theta[1];
+            vec![
+                named("a", "1", 1.0 - theta[0] / stiffness),
+                named("k", unit("N.m/rad", "N/m"), stiffness),
+                named("z_m", position, 1.0 / (p + q)),
+                named("n", "1", 1.0),
+                named("g", "1", q / (p + q)),
+            ]
+        }
+        ("cable_hysteresis", "play of many widths") => {
+            // Share that follows without memory; the width that the others have on average.
+            let lost: f64 = theta[..theta.len() - 2].iter().sum();
+            vec![named("a", "1", (1.0 - lost).clamp(0.0, 1.0))]
+        }
         ("cable_hysteresis", _) => vec![
             named("a", "1", shaped("a")),
             named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0]),

@@ -4,7 +4,7 @@ use arm::serial::Workspace;
 
 use crate::motion::Motion;
 use crate::nominal::{Evaluator, Load, Nominal, sign_series};
-use crate::nuisance::{Nuisance, believed};
+use crate::nuisance::{Nuisance, believed, drifting};
 use crate::robot::Robot;
 
 /// A residual space (gap-design.md, section 2).
@@ -60,6 +60,24 @@ pub struct Problem<'a> {
     pub tip_from_truth: bool,
     /// What is known only roughly, per cell.
     pub nuisances: Vec<Nuisance>,
+    /// What the nominal model leaves of the robot that it was learnt from, per cell: a smaller effect may be its error.
+    pub practical: Vec<f64>,
+    /// Was the nominal model learnt from a recording? What is left is then the model's error, not the sensors' noise.
+    pub from_recording: bool,
+}
+
+/// Times that an effect has to exceed what the nominal model leaves of the robot that it was learnt from.
+const BEYOND: f64 = 2.0;
+/// Travel below which a joint stands, rad and m.
+const STANDING: f64 = 0.01;
+const STANDING_M: f64 = 0.001;
+
+/// Does a joint move, in some run, so that its torque says more than where it hangs?
+fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
+    pairs.iter().any(|pair| {
+        let (low, high) = pair.real.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        high - low > if robot.prismatic[j] { STANDING_M } else { STANDING }
+    })
 }
 
 impl<'a> Problem<'a> {
@@ -84,9 +102,11 @@ impl<'a> Problem<'a> {
             loads,
             tip_from_truth,
             nuisances: Vec::new(),
+            practical: Vec::new(),
+            from_recording: false,
         };
         if pairs.iter().all(|pair| pair.real.torque.is_some()) {
-            (0..n).for_each(|j| problem.push_torque(j, &sim_loads));
+            (0..n).filter(|j| moves(robot, pairs, *j)).for_each(|j| problem.push_torque(j, &sim_loads));
         }
         if pairs.iter().all(|pair| pair.real.deflection.is_some()) {
             (0..n).for_each(|j| problem.push_transmission(j, &sim_loads));
@@ -96,7 +116,19 @@ impl<'a> Problem<'a> {
         }
         problem.lay_blocks(block_s);
         problem.nuisances = vec![Nuisance::default(); problem.cells.len()];
+        problem.practical = vec![0.0; problem.cells.len()];
         problem
+    }
+
+    /// The same, its model learnt from another recording of the robot, whose friction and zero points are not those of today.
+    #[must_use]
+    pub fn learnt_from_recording(mut self) -> Self {
+        self.nuisances = drifting(&self);
+        let of =
+            |cell: &Cell| if cell.channel == Channel::JointTorque { BEYOND * self.nominal.torque_error[cell.index] } else { 0.0 };
+        self.practical = self.cells.iter().map(of).collect();
+        self.from_recording = true;
+        self
     }
 
     /// The same, its model believed but roughly: no simulation has shown what it stands for.
@@ -215,6 +247,11 @@ impl<'a> Problem<'a> {
                     .collect()
             })
             .collect();
+    }
+
+    /// Is there any cell of a channel?
+    pub fn has(&self, channel: Channel) -> bool {
+        self.cells.iter().any(|cell| cell.channel == channel)
     }
 
     /// Index of a cell, if the recording has it.

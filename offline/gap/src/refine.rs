@@ -10,6 +10,8 @@ const HALVINGS: usize = 7;
 const SECANTS: usize = 4;
 /// First step of an edge, of its time.
 const EDGE_S: f64 = 0.1;
+/// The same of a memory of the whole motion.
+const SHARP_ROUNDS: usize = 10;
 /// Rounds over all numbers of a shape.
 const ROUNDS: usize = 2;
 
@@ -46,12 +48,19 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
         least = misfit(&best);
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
-    let rounds = if free.len() + best.edges() > 1 { ROUNDS } else { 1 };
+    // Sharp and long valleys: memories that the motion shows in every sample.
+    let rounds = if family.form == "to the ground" {
+        SHARP_ROUNDS
+    } else if free.len() + best.edges() > 1 {
+        ROUNDS
+    } else {
+        1
+    };
     for _ in 0..rounds {
         for &k in &free {
             let mut step =
                 family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
-            for _ in 0..HALVINGS {
+            for _ in 0..HALVINGS + if rounds == SHARP_ROUNDS { 5 } else { 0 } {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
                     // A positive number of a grid stays one.

@@ -19,11 +19,21 @@ pub struct DriveNominal {
     pub torque_per_count: f64,
     /// Joint position where the motor stands at 0.
     pub offset: f64,
+    /// Spring from the joint to the ground: stiffness, damping, rest position.
+    pub ground: [f64; 3],
 }
 
 impl Default for DriveNominal {
     fn default() -> Self {
-        Self { rotor_inertia: f64::NAN, coulomb: 0.0, viscous: 0.0, stiffness: f64::INFINITY, torque_per_count: 0.0, offset: 0.0 }
+        Self {
+            rotor_inertia: f64::NAN,
+            coulomb: 0.0,
+            viscous: 0.0,
+            stiffness: f64::INFINITY,
+            torque_per_count: 0.0,
+            offset: 0.0,
+            ground: [0.0; 3],
+        }
     }
 }
 
@@ -34,6 +44,8 @@ pub struct PayloadSite {
     pub link: usize,
     /// In the link's frame, m.
     pub position_m: [f64; 3],
+    /// What to call it.
+    pub name: Option<String>,
 }
 
 /// An arm with its drives.
@@ -53,6 +65,8 @@ pub struct Robot {
     pub motor_from_joint: DMatrix<f64>,
     /// One per joint.
     pub drives: Vec<DriveNominal>,
+    /// Names of columns of its recordings that are not those of tidy CSV: name, name in the recording, scale.
+    pub columns: Vec<(String, String, f64)>,
     /// Candidate places of a payload beside the last link.
     pub payload_sites: Vec<PayloadSite>,
 }
@@ -72,7 +86,8 @@ impl Robot {
         let n = model.joint_count().min(arm.joint_count());
         let a = model.motor_from_joint();
         let motor_from_joint = DMatrix::from_fn(n, n, |i, j| a[i][j]);
-        let drives = model.drives().into_iter().take(n).map(|drive| {
+        let passive = model.passive();
+        let drives = model.drives().into_iter().zip(passive).take(n).map(|(drive, passive)| {
             let reduction = drive.reduction;
             DriveNominal {
                 rotor_inertia: drive.rotor_inertia_kg_m2 * reduction * reduction,
@@ -81,15 +96,21 @@ impl Robot {
                 stiffness: if drive.connection == Connection::Cable { drive.stiffness } else { f64::INFINITY },
                 torque_per_count: drive.torque_per_count_nm(),
                 offset: drive.offset,
+                ground: [passive.stiffness, passive.damping, passive.rest],
             }
         });
-        let sites = model.payload_sites.iter().map(|site| PayloadSite { link: site.link.min(n - 1), position_m: site.position_m });
+        let sites = model.payload_sites.iter().map(|site| PayloadSite {
+            link: site.link.min(n - 1),
+            position_m: site.position_m,
+            name: site.name.clone(),
+        });
         Self {
             name: model.name().to_owned(),
             joints: model.joint_names().into_iter().take(n).collect(),
             links: model.link_names().into_iter().take(n).collect(),
             prismatic: arm.bodies().iter().take(n).map(|body| body.joint.kind.is_prismatic()).collect(),
             drives: drives.collect(),
+            columns: model.columns.iter().map(|c| (c.name.clone(), c.source.clone(), c.scale)).collect(),
             payload_sites: sites.collect(),
             motor_from_joint,
             arm,

@@ -114,8 +114,10 @@ pub struct Run {
     pub id: String,
     /// First time, s.
     pub start_s: f64,
-    /// Sample period, s.
+    /// Sample period, s; 1 of points.
     pub dt_s: f64,
+    /// Are the samples points without a clock, at each of which the robot stood?
+    pub points: bool,
     /// Joint positions as the motors say them, rad or m.
     pub position: Vec<Vec<f64>>,
     /// Torques of the motors at the joints (Aᵀ τ), N·m or N.
@@ -158,14 +160,24 @@ impl Run {
     /// [`RunError`] where time or positions are missing.
     pub fn new(recording: &Recording, robot: &Robot) -> Result<Self, RunError> {
         let run = recording.name.clone();
-        let time = recording.time_s().ok_or_else(|| RunError::NoTime { run: run.clone() })?;
         let n = robot.joint_count();
-        let clock = Clock::of(&run, time)?;
+        let clock = match recording.time_s() {
+            Some(time) if !by_points(time) => Clock::of(&run, time)?,
+            // Points at which the robot stopped and was measured: their order is known, and that is all that is needed.
+            _ if is_table(recording, robot) => Clock::of_points(recording.rows()),
+            Some(time) => Clock::of(&run, time)?,
+            None => return Err(RunError::NoTime { run }),
+        };
+        let time: Vec<f64> = recording.time_s().map_or_else(Vec::new, <[f64]>::to_vec);
         same_kinds(&run, recording, robot)?;
+        let mapped = |name: &str| {
+            let (_, source, scale) = robot.columns.iter().find(|(own, ..)| own == name)?;
+            recording.column(source).map(|column| column.iter().map(|x| x * scale).collect::<Vec<f64>>())
+        };
         // A column without a single value is not there.
         let series = |name: &str| {
-            let column = recording.column(name).filter(|column| column.iter().any(|x| x.is_finite()))?;
-            Some(clock.resample(time, column))
+            let column = mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec))?;
+            column.iter().any(|x| x.is_finite()).then(|| clock.resample(&time, &column))
         };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
         // The first of the names that every joint has.
@@ -178,6 +190,7 @@ impl Run {
             &|j| format!("q_{}_{}", j + 1, unit(j)),
             &|j| format!("q_{}", j + 1),
             &|j| format!("q_des_{}", j + 1),
+            &|j| format!("q_des_{}_{}", j + 1, unit(j)),
         ]);
         let from_motors = motor.is_some();
         let position = match (&motor, reported) {
@@ -228,10 +241,13 @@ impl Run {
             start_s: clock.start_s,
             dt_s: clock.dt_s,
             mask: vec![false; position[0].len()],
+            points: clock.points,
             drive: combine(&robot.coupling(), &position),
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
-            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1)]),
+            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
+                format!("q_act_{}_{}", j + 1, unit(j))
+            }]),
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
@@ -339,6 +355,7 @@ impl Run {
             id: self.id.clone(),
             start_s,
             dt_s,
+            points: self.points,
             position: set(&self.position),
             drive: set(&self.drive),
             torque: self.torque.as_ref().map(set),
@@ -359,6 +376,7 @@ impl Run {
             id: self.id.clone(),
             start_s: self.time_s(from),
             dt_s: self.dt_s,
+            points: self.points,
             position: cut(&self.position),
             drive: cut(&self.drive),
             torque: self.torque.as_ref().map(cut),
@@ -437,6 +455,21 @@ pub fn alike(real: &Run, sim: &Run) -> bool {
     })
 }
 
+/// Share of the recording's own jitter from which on a simulation's torque is not that of a simulation.
+const JITTER: f64 = 0.3;
+
+/// Does the torque of one jitter like that of the other?
+pub fn as_noisy(real: &Run, sim: &Run) -> bool {
+    let jitter = |run: &Run, j: usize| {
+        let series = run.torque.as_ref().map_or(&[][..], |torque| &torque[j]);
+        let mut steps: Vec<f64> = series.windows(4).map(|x| (x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+    };
+    let n = real.position.len();
+    2 * (0..n).filter(|&j| jitter(sim, j) > JITTER * jitter(real, j)).count() > n
+}
+
 /// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.
 ///
 /// # Errors
@@ -483,6 +516,31 @@ struct Clock {
     dt_s: f64,
     count: usize,
     uniform: bool,
+    points: bool,
+}
+
+/// Seconds between samples beyond which an uneven clock is none.
+const SLOW_S: f64 = 0.1;
+
+/// Are these times those of points that were measured one after the other?
+fn by_points(time: &[f64]) -> bool {
+    if time.len() < 3 || !time.iter().all(|t| t.is_finite()) {
+        return false;
+    }
+    let clock = Clock::new(time);
+    !clock.uniform && clock.dt_s > SLOW_S
+}
+
+/// Has a recording what can be compared without a clock: positions, and the same measured at the joints?
+fn is_table(recording: &Recording, robot: &Robot) -> bool {
+    let has = |name: &String| {
+        let mapped = robot.columns.iter().any(|(own, source, _)| own == name && recording.column(source).is_some());
+        mapped || recording.column(name).is_some()
+    };
+    (0..robot.joint_count()).all(|j| {
+        let (n, unit) = (j + 1, robot.position_unit(j));
+        [format!("truth_jpos_{n}_{unit}"), format!("q_act_{n}"), format!("q_act_{n}_{unit}")].iter().any(has)
+    })
 }
 
 impl Clock {
@@ -509,15 +567,22 @@ impl Clock {
         Ok(clock)
     }
 
+    fn of_points(count: usize) -> Self {
+        Self { start_s: 0.0, dt_s: 1.0, count, uniform: true, points: true }
+    }
+
     fn new(time: &[f64]) -> Self {
         let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
-        let dt_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+        let median = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+        // Times are rounded: where no sample is missing, the mean step says more than any one of them.
+        let even = steps.first().zip(steps.last()).is_some_and(|(least, most)| *least > 0.75 * median && *most < 1.25 * median);
+        let dt_s = if even { (time[time.len() - 1] - time[0]) / steps.len() as f64 } else { median };
         let (start_s, span) = (time[0], time[time.len() - 1] - time[0]);
-        let count = (span / dt_s).round() as usize + 1;
+        let count = ((span / dt_s).round() as usize).saturating_add(1);
         let uniform =
             count == time.len() && time.iter().enumerate().all(|(i, t)| (t - start_s - i as f64 * dt_s).abs() < 0.25 * dt_s);
-        Self { start_s, dt_s, count, uniform }
+        Self { start_s, dt_s, count, uniform, points: false }
     }
 
     /// Linear between rows that follow one another; where rows were lost, NaN. Beside an empty cell, the nearer row within half

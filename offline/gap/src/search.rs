@@ -106,7 +106,8 @@ fn window_noise(problem: &Problem) -> Vec<Noise> {
     let motion = &problem.pairs[0].real;
     let step = motion.rows.get(1).map_or(1, |second| second - motion.rows[0]);
     let behind = motion.window.autocovariance(step, 3);
-    let of = |tip: bool, rows: usize| if tip { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
+    let white = problem.from_recording;
+    let of = |tip: bool, rows: usize| if tip || white { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
     problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()
 }
 
@@ -187,8 +188,16 @@ impl Search<'_, '_> {
             .filter(|c| shares[*c] >= self.thresholds.share)
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
             .fold(0.0, f64::max);
+        let theta = &after.coefficients[after.coefficients.len() - scored.candidate.columns.len()..];
+        let beyond = |c: usize| {
+            let told = scored.candidate.effect(c, theta);
+            !told.is_empty()
+                && crate::nominal::rms(self.problem.nuisances[c].without(&told).into_iter()) >= self.problem.practical[c]
+        };
+        let enough = !self.problem.from_recording || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
         let share = shares.into_iter().fold(0.0, f64::max);
-        Judged { gain, share, amplitude: if others.is_empty() { f64::INFINITY } else { amplitude } }
+        let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
+        Judged { gain, share, amplitude: if enough { amplitude } else { -1.0 } }
     }
 
     /// Gain of a candidate over the others with the noise that it leaves itself (Cochrane-Orcutt): by its autoregression, or
@@ -239,6 +248,7 @@ impl Search<'_, '_> {
         let alone = judged.amplitude.is_infinite();
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
+            && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
 

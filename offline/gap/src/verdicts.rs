@@ -324,9 +324,24 @@ pub(crate) fn joints(robot: &Robot, candidate: &Candidate) -> Vec<String> {
     candidate.family.joints.iter().map(|j| robot.joints[(*j).min(robot.joints.len() - 1)].clone()).collect()
 }
 
+/// Name and link of the site where a payload was found.
+fn site(found: &Found, candidate: &Candidate) -> Option<String> {
+    if candidate.family.form != "at a site" {
+        return None;
+    }
+    let link = candidate.shape_of("link")? as usize;
+    let at = ["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(f64::NAN));
+    let site = found.robot.payload_sites.iter().find(|site| site.link == link && site.position_m == at)?;
+    let place = site.name.clone().unwrap_or_else(|| "a payload site".to_owned());
+    Some(format!("{place} (link {}, {:.3}, {:.3}, {:.3} m)", found.robot.links[link], at[0], at[1], at[2]))
+}
+
 fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f64) -> Location {
     let cell = &found.problem.cells[main_cell(found, candidate, &estimate.coefficients)];
     let mut regime = regime::regime(candidate);
+    if let Some(place) = site(found, candidate) {
+        regime.condition = format!("with posture: the weight hangs at {place}");
+    }
     regime.energy_share = Some(share.clamp(0.0, 1.0));
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), regime::subsystem(candidate), regime);
     location.energy_share = Some(share.clamp(0.0, 1.0));
@@ -359,7 +374,14 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
         after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
     }
     let nuisance = &found.held.nuisances[c];
-    if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
+    if found.problem.nuisances[cell].of_run.contains(&true) {
+        let rows = &found.held.cells[c].rows;
+        for run in 0..found.held.pairs.len() {
+            let own = || rows.iter().enumerate().filter(|(_, row)| row.0 == run).map(|(k, _)| k);
+            let mean = own().map(|k| after[k]).sum::<f64>() / own().count().max(1) as f64;
+            own().for_each(|k| after[k] -= mean);
+        }
+    } else if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
         after.iter_mut().zip(nuisance.predict(&found.beside[cell])).for_each(|(y, p)| *y -= p);
     }
     Some((c, before, after))

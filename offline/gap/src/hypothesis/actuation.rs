@@ -11,7 +11,7 @@ const ORDERS: u32 = 64;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
-    if dictionary.problem.cell(TORQUE, 0).is_none() {
+    if !dictionary.problem.has(TORQUE) {
         return;
     }
     for j in 0..dictionary.joints() {

@@ -1,6 +1,8 @@
 //! Building blocks of the columns: series at the rows of the residuals, and how a torque or a deflection reaches each cell.
 
-use arm::serial::Workspace;
+use std::sync::OnceLock;
+
+use arm::serial::{PARAMETERS, Workspace};
 
 use crate::problem::{Channel, Problem};
 
@@ -55,6 +57,7 @@ pub struct Dictionary<'a> {
     pub tip_jacobian: Vec<Vec<f64>>,
     /// Rows of the tip.
     pub tip_rows: Vec<(usize, usize)>,
+    regressor: OnceLock<Vec<Vec<f64>>>,
 }
 
 impl<'a> Dictionary<'a> {
@@ -79,7 +82,23 @@ impl<'a> Dictionary<'a> {
                 jacobian[..3 * n].to_vec()
             })
             .collect();
-        Self { problem, grid, tip_jacobian, tip_rows }
+        Self { problem, grid, tip_jacobian, tip_rows, regressor: OnceLock::new() }
+    }
+
+    /// The arm's regressor at every grid row, N×10N row-major.
+    pub fn regressor(&self) -> &[Vec<f64>] {
+        self.regressor.get_or_init(|| {
+            let arm = &self.problem.robot.arm;
+            let n = self.joints();
+            let mut ws = Workspace::new(arm);
+            let at = |&(r, i, _): &(usize, usize, usize)| {
+                let state = self.problem.pairs[r].real.link(i);
+                let mut y = vec![0.0; n * n * PARAMETERS];
+                arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
+                y
+            };
+            self.grid.iter().map(at).collect()
+        })
     }
 
     /// Number of joints.

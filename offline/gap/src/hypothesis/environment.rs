@@ -16,19 +16,30 @@ const EXPONENTS: [f64; 2] = [1.0, 1.5];
 
 /// Tip and Jacobian (3×N row-major) at the grid rows.
 struct Tips {
+    rows: Vec<(usize, usize, usize)>,
+    first: usize,
     positions: Vec<Vector3<f64>>,
     jacobians: Vec<Vec<f64>>,
 }
 
+impl Tips {
+    /// Those of a dictionary: the same, or made anew for other runs.
+    fn of(self: &Arc<Self>, dictionary: &Dictionary) -> Arc<Self> {
+        let same = self.first == std::ptr::from_ref(dictionary.problem.pairs).addr() && self.rows == dictionary.grid;
+        if same { self.clone() } else { Arc::new(tips(dictionary)) }
+    }
+}
+
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
-    if dictionary.problem.cell(TORQUE, 0).is_none() {
+    if !dictionary.problem.has(TORQUE) {
         return;
     }
     let tips = Arc::new(tips(dictionary));
     let own = tips.clone();
     all.push(
         Family::fixed("external_contact", &[], "steady force", TORQUE, &[Bound::Free; 3], move |d| {
+            let own = own.of(d);
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| effort(d, &own, |_| axis)).to_vec()
         })
         // A force that never lets go is a weight before it is a contact.
@@ -49,6 +60,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 &[("x_0", true), ("p", false), ("normal", false)],
                 product(&[&walls, &EXPONENTS, &[k as f64]]),
                 move |d, s| {
+                    let tips = tips.of(d);
                     // The wall pushes back, against its normal.
                     vec![effort(d, &tips, |row| -normal * (tips.positions[row].dot(&normal) - s[0]).max(0.0).powf(s[1]))]
                 },
@@ -70,7 +82,7 @@ fn tips(dictionary: &Dictionary) -> Tips {
         problem.robot.arm.jacobian(&mut ws, &q, &Vector3::zeros(), &mut jacobian);
         jacobians.push(jacobian[..3 * n].to_vec());
     }
-    Tips { positions, jacobians }
+    Tips { rows: dictionary.grid.clone(), first: std::ptr::from_ref(problem.pairs).addr(), positions, jacobians }
 }
 
 /// A force on the tip asks `-Jᵀ f` of the joints.

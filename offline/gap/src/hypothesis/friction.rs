@@ -20,7 +20,7 @@ const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
-    if dictionary.problem.cell(Channel::JointTorque, 0).is_none() {
+    if !dictionary.problem.has(Channel::JointTorque) {
         return;
     }
     for j in 0..dictionary.joints() {

@@ -1,8 +1,6 @@
 //! Weights, links and the direction of gravity.
 
-use std::sync::Arc;
-
-use arm::serial::{LinkInertia, PARAMETERS, Workspace};
+use arm::serial::{LinkInertia, PARAMETERS};
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::dictionary::Dictionary;
@@ -11,18 +9,16 @@ use crate::nominal::Evaluator;
 use crate::problem::Channel;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
-    if dictionary.problem.cell(TORQUE, 0).is_none() {
+    if !dictionary.problem.has(TORQUE) {
         return;
     }
     let robot = dictionary.problem.robot;
     let n = robot.joint_count();
     let last = n - 1;
-    let y = Arc::new(regressor(dictionary));
     let tip = robot.arm.tool_pose().translation.vector;
     let mut places = vec![("at the tip", last, tip)];
     places.extend(robot.payload_sites.iter().map(|site| ("at a site", site.link, Vector3::from(site.position_m))));
     for (form, link, point) in places {
-        let y = y.clone();
         all.push(Family::shaped(
             "payload",
             &[],
@@ -31,10 +27,9 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             &[Bound::Positive],
             &[("link", false), ("c_x", false), ("c_y", false), ("c_z", false)],
             vec![vec![link as f64, point.x, point.y, point.z]],
-            move |d, s| vec![point_column(d, &y, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
+            move |d, s| vec![point_column(d, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
         ));
     }
-    let own = y.clone();
     let somewhere = Family::shaped(
         "payload",
         &[],
@@ -43,11 +38,10 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         &[Bound::Positive],
         &[("link", false), ("c_x", true), ("c_y", true), ("c_z", true)],
         vec![vec![last as f64, tip.x, tip.y, tip.z]],
-        move |d, s| vec![point_column(d, &own, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
+        move |d, s| vec![point_column(d, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
     );
     all.push(somewhere.stepped(&[None, Some(0.04), Some(0.04), Some(0.04)]).penalised(3.0));
     // Mass and first moment free; inertia about the origin of a small body follows from them only roughly, and weighs little.
-    let own = y.clone();
     all.push(
         Family::shaped(
             "payload",
@@ -57,25 +51,25 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             &[Bound::Positive, Bound::Free, Bound::Free, Bound::Free],
             &[("link", false)],
             vec![vec![last as f64]],
-            move |d, s| (0..4).map(|k| parameter_column(d, &own, s[0] as usize, k)).collect(),
+            move |d, s| (0..4).map(|k| parameter_column(d, s[0] as usize, k)).collect(),
         )
         .penalised(3.0),
     );
+    // The links of one robot are the same in two recordings of it.
+    let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
         let parameters = robot.arm.link_inertia(link).parameters();
         if parameters.iter().any(|x| *x != 0.0) {
-            let y = y.clone();
             all.push(
                 Family::fixed("link_inertia", &[link], "scaled", TORQUE, &[Bound::Between(-0.95, 20.0)], move |d| {
-                    vec![weighted_column(d, &y, link, &parameters)]
+                    vec![weighted_column(d, link, &parameters)]
                 })
-                .penalised(1.0),
+                .penalised(1.0 + altered),
             );
         }
         // The parameter that the motion shows best comes first, and is the one that is reported.
-        let free = independent(dictionary, &y, link);
+        let free = independent(dictionary, link);
         let Some(first) = free.first().map(|k| *k as f64) else { continue };
-        let y = y.clone();
         let bounds = vec![Bound::Free; free.len()];
         let family = Family::shaped(
             "link_inertia",
@@ -85,39 +79,23 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             &bounds,
             &[("parameter", false)],
             vec![vec![first]],
-            move |d, _| free.iter().map(|k| parameter_column(d, &y, link, *k)).collect(),
+            move |d, _| free.iter().map(|k| parameter_column(d, link, *k)).collect(),
         );
-        all.push(family.penalised(4.0));
+        all.push(family.penalised(4.0 + altered));
     }
     push_gravity(all);
 }
 
 const TORQUE: Channel = Channel::JointTorque;
 
-/// The arm's regressor at every grid row, N×10N row-major.
-fn regressor(dictionary: &Dictionary) -> Vec<Vec<f64>> {
-    let robot = dictionary.problem.robot;
-    let n = robot.joint_count();
-    let mut ws = Workspace::new(&robot.arm);
-    dictionary
-        .grid
-        .iter()
-        .map(|&(r, i, _)| {
-            let state = dictionary.problem.pairs[r].real.link(i);
-            let mut y = vec![0.0; n * n * PARAMETERS];
-            robot.arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
-            y
-        })
-        .collect()
-}
-
 /// The torque of a set of parameters of one link.
-fn weighted_column(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize, parameters: &[f64; PARAMETERS]) -> super::Column {
+fn weighted_column(dictionary: &Dictionary, link: usize, parameters: &[f64; PARAMETERS]) -> super::Column {
     let n = dictionary.joints();
     let torques: Vec<Option<Vec<f64>>> = (0..n)
         .map(|j| {
             // Links beyond a joint load it; the others do not.
             (j <= link).then(|| {
+                let regressor = dictionary.regressor();
                 let start = j * n * PARAMETERS + link * PARAMETERS;
                 regressor.iter().map(|y| y[start..start + PARAMETERS].iter().zip(parameters).map(|(a, b)| a * b).sum()).collect()
             })
@@ -126,19 +104,20 @@ fn weighted_column(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize,
     dictionary.effort(&torques, true)
 }
 
-fn parameter_column(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize, k: usize) -> super::Column {
+fn parameter_column(dictionary: &Dictionary, link: usize, k: usize) -> super::Column {
     let mut parameters = [0.0; PARAMETERS];
     parameters[k] = 1.0;
-    weighted_column(dictionary, regressor, link, &parameters)
+    weighted_column(dictionary, link, &parameters)
 }
 
-fn point_column(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize, point: &Vector3<f64>) -> super::Column {
-    weighted_column(dictionary, regressor, link, &LinkInertia::point(1.0, *point).parameters())
+fn point_column(dictionary: &Dictionary, link: usize, point: &Vector3<f64>) -> super::Column {
+    weighted_column(dictionary, link, &LinkInertia::point(1.0, *point).parameters())
 }
 
 /// Parameters of a link that the motion tells apart, most visible first (pivoted Gram-Schmidt).
-fn independent(dictionary: &Dictionary, regressor: &[Vec<f64>], link: usize) -> Vec<usize> {
+fn independent(dictionary: &Dictionary, link: usize) -> Vec<usize> {
     let n = dictionary.joints();
+    let regressor = dictionary.regressor();
     let rows = regressor.len() * (link + 1);
     let mut a = DMatrix::from_fn(rows, PARAMETERS, |row, k| {
         regressor[row / (link + 1)][(row % (link + 1)) * n * PARAMETERS + link * PARAMETERS + k]

@@ -6,6 +6,10 @@ use crate::problem::Channel;
 
 /// Widths of play, shares of a joint's travel.
 const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.012, 0.018, 0.027, 0.04, 0.06, 0.09, 0.14];
+/// Widths of play that stand beside each other, shares of a joint's travel.
+const WIDTHS: [f64; 12] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
+/// The same for the motion of another joint.
+const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// Shares of the straight spring in a Bouc-Wen element.
@@ -21,7 +25,12 @@ const TRANSMISSION: Channel = Channel::Transmission;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let problem = dictionary.problem;
-    if problem.cell(TRANSMISSION, 0).is_none() && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
+    for j in 0..dictionary.joints() {
+        if problem.robot.drives[j].ground[0] > 0.0 && problem.cell(Channel::JointTorque, j).is_some() {
+            push_ground(dictionary, j, all);
+        }
+    }
+    if !problem.has(TRANSMISSION) && (problem.cell(Channel::EndEffector, 0).is_none() || problem.tip_from_truth) {
         return;
     }
     for j in 0..dictionary.joints() {
@@ -44,6 +53,25 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         product(&[&PLAY.map(|share| share * travel)]),
         move |d, s| vec![d.deflection_of(j, lag(d, j, s[0]))],
     ));
+    // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
+    if size(&dictionary.load(j)) < 1e-9 {
+        let widths = WIDTHS.map(|share| share * travel);
+        let family = Family::fixed(
+            "cable_hysteresis",
+            &[j],
+            "play of many widths",
+            TRANSMISSION,
+            &[Bound::Free; WIDTHS.len() + 2],
+            move |d| {
+                widths
+                    .iter()
+                    .map(|width| d.deflection_of(j, lag(d, j, *width)))
+                    .chain([d.deflection_of(j, minus(&position(d, j))), offset(d, j)])
+                    .collect()
+            },
+        );
+        all.push(family.penalised(3.0));
+    }
     let usual = size(&dictionary.load(j)).max(1e-9);
     all.push(
         Family::shaped(
@@ -167,6 +195,56 @@ fn per_run(dictionary: &Dictionary, series: &[f64], memory: impl Fn(&[f64]) -> V
     out
 }
 
+/// Bends of a spring to the ground, over one deflection: those that depend on the way, and those that turn with it, over the first.
+const BENDS: [f64; 3] = [0.15, 0.5, 1.5];
+const TURNS: [f64; 6] = [-4.0, -1.5, -0.5, 0.5, 1.5, 4.0];
+
+/// A spring to the ground whose force has a memory: `k_0 y + k_1 z`, `zd = yd - (p |yd| z + q yd |z|)`.
+fn push_ground(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
+    let usual = size(&position(dictionary, j)).max(1e-12);
+    let family = Family::shaped(
+        "cable_hysteresis",
+        &[j],
+        "to the ground",
+        Channel::JointTorque,
+        &[Bound::Positive, Bound::Free],
+        &[("p", true), ("q_over_p", true)],
+        product(&[&BENDS.map(|b| b / usual), &TURNS]),
+        move |d, s| {
+            let memory = d.smoothed(|r| remembered(&d.problem.pairs[r].real.run.position[j], s[0], s[0] * s[1]));
+            vec![d.effort_of(j, memory, false), d.effort_of(j, position(d, j), false)]
+        },
+    );
+    all.push(family.penalised(3.0));
+}
+
+/// Memory of a deflection, by midpoints in steps between the samples, where the deflection is a cubic; the first samples are
+/// gone through twice, there and back, so that it has settled.
+fn remembered(deflection: &[f64], p: f64, q: f64) -> Vec<f64> {
+    const PARTS: usize = 8;
+    let settle = deflection.len().min(400);
+    let series: Vec<f64> = deflection[..settle].iter().rev().chain(deflection).copied().collect();
+    let at = |i: usize| series[i.min(series.len() - 1)];
+    let mut z = 0.0_f64;
+    let mut out = vec![0.0];
+    for i in 1..series.len() {
+        let (a, b, c, d) = (at(i.saturating_sub(2)), at(i - 1), at(i), at(i + 1));
+        let (from, to) = (0.5 * (c - a), 0.5 * (d - b));
+        let cubic = |t: f64| b + t * (from + t * (3.0 * (c - b) - 2.0 * from - to + t * (2.0 * (b - c) + from + to)));
+        let mut before = b;
+        for part in 1..=PARTS {
+            let now = cubic(part as f64 / PARTS as f64);
+            let step = now - before;
+            before = now;
+            let slope = |z: f64| step - (p * step.abs() * z + q * step * z.abs());
+            let half = z + 0.5 * slope(z);
+            z += slope(half);
+        }
+        out.push(z);
+    }
+    out.split_off(settle)
+}
+
 /// Deflection times stiffness of a Bouc-Wen element (g = 0.5) under a load, where `load = a x + (1 - a) z`. Shape: a, yield
 /// load, n, and the share of the load that z carries at the start, which nobody knows.
 fn bouc_wen(load: &[f64], shape: &[f64]) -> Vec<f64> {
@@ -224,6 +302,8 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         .penalised(1.5),
     );
     let travel = dictionary.travel(j);
+    // A bend in points that a camera saw is mostly play or the camera.
+    let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
     let (from, to, count) = PERIODS;
     let periods: Vec<f64> = (0..count).map(|k| travel * from * (to / from).powf(k as f64 / (count - 1) as f64)).collect();
     all.push(
@@ -242,7 +322,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                 vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
             },
         )
-        .penalised(2.0),
+        .penalised(2.0 + unlikely),
     );
 }
 
@@ -260,6 +340,17 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             })
             .penalised(1.5),
         );
+        if size(&dictionary.load(j)) < 1e-9 {
+            // What the other joint drags along comes late where its cable has play.
+            let widths = COUPLED_WIDTHS.map(|share| share * dictionary.travel(i));
+            let mut bounds = vec![small];
+            bounds.resize(2 + widths.len(), Bound::Free);
+            let family = Family::fixed("joint_coupling", &pair, "position, with play", TRANSMISSION, &bounds, move |d| {
+                let late = widths.iter().map(|width| d.deflection_of(j, lag(d, i, *width)));
+                std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
+            });
+            all.push(family.penalised(4.0));
+        }
         all.push(
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
                 // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.

@@ -73,6 +73,9 @@ fn of_input(problem: &InputProblem) -> CsvProblem {
     }
 }
 
+/// Names of a first column that only counts the rows.
+const ROW_NUMBERS: [&str; 3] = ["i", "row", "index"];
+
 /// Is this a header of column names separated by commas?
 fn check_names(names: &[&str]) -> Result<(), CsvProblem> {
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
@@ -113,6 +116,14 @@ impl<'a> Reader<'a> {
         recording.columns = std::iter::zip(fields.into_iter().zip(&names), values)
             .map(|((field, name), values)| Column { name: field.name, known: field.known, values, original: (*name).to_owned() })
             .collect();
+        if let Some(time) = recording.columns.iter().position(|column| column.name == "t_s") {
+            if recording.columns[time].values.windows(2).all(|pair| pair[0] < pair[1]) {
+                recording.columns[..=time].rotate_right(1);
+            } else {
+                recording.columns[time].name = "time_of_session_s".to_owned();
+                recording.columns[time].known = false;
+            }
+        }
         Ok(recording)
     }
 
@@ -146,7 +157,8 @@ impl<'a> Reader<'a> {
                 let problem = CsvProblem::Duplicate { first: first + 1, name: field.name };
                 return Err(self.at(i, name, problem));
             }
-            if field.name == "t_s" && i != 0 {
+            // A number of the row may stand before the time.
+            if field.name == "t_s" && i != 0 && !(i == 1 && ROW_NUMBERS.contains(&names[0])) {
                 return Err(self.at(i, name, CsvProblem::TimeNotFirst));
             }
             fields.push(field);
@@ -155,7 +167,7 @@ impl<'a> Reader<'a> {
     }
 
     fn rows(&mut self, names: &[&str], fields: &[Field], values: &mut [Vec<f64>]) -> Result<(), CsvError> {
-        let is_run = fields.first().is_some_and(|field| field.name == "t_s");
+        let time = fields.iter().position(|field| field.name == "t_s");
         while self.advance()? {
             let text = self.text()?;
             if text.starts_with('#') {
@@ -169,11 +181,12 @@ impl<'a> Reader<'a> {
                 let value = number(cell(text), &fields[i], self.gaps).map_err(|problem| self.at(i, names[i], problem))?;
                 values[i].push(value);
             }
-            if is_run
-                && let [.., before, now] = values[0][..]
+            // Behind a number of the row it may begin anew: then the rows are a table.
+            if let Some(time) = time.filter(|time| *time == 0)
+                && let [.., before, now] = values[time][..]
                 && now <= before
             {
-                return Err(self.at(0, names[0], CsvProblem::TimeNotRising { before, now }));
+                return Err(self.at(time, names[time], CsvProblem::TimeNotRising { before, now }));
             }
         }
         Ok(())

@@ -27,6 +27,7 @@
 //! Tables of a robot from a URDF: docs/simulator.md.
 
 mod change;
+mod columns;
 mod controller_model;
 mod drive_model;
 mod effect;
@@ -41,6 +42,7 @@ mod tables;
 mod urdf_file;
 mod urdf_robot;
 
+pub use columns::MappedColumn;
 pub use controller_model::{ControllerModel, ControllerNumbers};
 pub use drive_model::{Connection, DriveModel};
 pub(crate) use effect::delay;

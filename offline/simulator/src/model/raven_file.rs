@@ -24,6 +24,8 @@ struct RobotFile {
     cable: Option<Spanned<CableTable>>,
     homing: Option<Spanned<HomingTable>>,
     stiction: Option<Spanned<StictionTable>>,
+    #[serde(default, rename = "columns")]
+    _columns: toml::Table,
     #[serde(default, rename = "payload_site")]
     sites: Vec<Spanned<SiteTable>>,
     #[serde(default, rename = "effect")]

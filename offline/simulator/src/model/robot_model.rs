@@ -7,7 +7,9 @@ use arm::{RIGID_JOINTS, Side};
 use serde::Deserialize;
 
 use super::error::syntax;
-use super::{ControllerModel, DriveModel, Effect, Robot, RobotError, UrdfRobot, raven, raven_file, save, urdf_file};
+use super::{
+    ControllerModel, DriveModel, Effect, MappedColumn, Robot, RobotError, UrdfRobot, columns, raven, raven_file, save, urdf_file,
+};
 use crate::plant::{Passive, Plant, PlantError};
 use crate::{any_arm, robot_plant};
 
@@ -32,6 +34,8 @@ pub struct RobotModel {
     pub(super) side: Side,
     /// Where payloads may hang.
     pub payload_sites: Vec<PayloadSite>,
+    /// Names of columns in its recordings that are not those of tidy CSV.
+    pub columns: Vec<MappedColumn>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -84,11 +88,11 @@ impl RobotModel {
         match header.base.as_deref() {
             Some("raven2-nominal") => {
                 let (robot, payload_sites) = raven_file::robot(text)?;
-                Ok(Self { payload_sites, ..Self::raven(robot, Side::Gold) })
+                Ok(Self { payload_sites, columns: columns::read(text)?, ..Self::raven(robot, Side::Gold) })
             }
             Some("urdf") => {
                 let (robot, payload_sites) = urdf_file::robot(text, folder)?;
-                Ok(Self { payload_sites, ..Self::of(Kind::Urdf(Box::new(robot))) })
+                Ok(Self { payload_sites, columns: columns::read(text)?, ..Self::of(Kind::Urdf(Box::new(robot))) })
             }
             other => {
                 let found = other.unwrap_or("missing").to_owned();
@@ -111,7 +115,7 @@ impl RobotModel {
     }
 
     fn of(kind: Kind) -> Self {
-        Self { kind, side: Side::Gold, payload_sites: Vec::new() }
+        Self { kind, side: Side::Gold, payload_sites: Vec::new(), columns: Vec::new() }
     }
 
     /// The same robot, its other arm. A robot from a URDF has one arm only.

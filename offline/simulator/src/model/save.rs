@@ -26,6 +26,16 @@ pub(super) fn text(model: &RobotModel) -> String {
             let _ = writeln!(out, "name = {}", quoted(name));
         }
     }
+    if !model.columns.is_empty() {
+        out.push_str("\n[columns]\n");
+        for column in &model.columns {
+            let _ = if (column.scale - 1.0).abs() < f64::EPSILON {
+                writeln!(out, "{} = {}", key(&column.name), quoted(&column.source))
+            } else {
+                writeln!(out, "{} = {{ column = {}, scale = {:?} }}", key(&column.name), quoted(&column.source), column.scale)
+            };
+        }
+    }
     for effect in model.effects() {
         push_effect(&mut out, effect, &joints, &links);
     }

@@ -43,6 +43,8 @@ struct UrdfFile {
     inertial: Named<InertialTable>,
     homing: Option<Spanned<HomingTable>>,
     integrator: Option<Spanned<IntegratorTable>>,
+    #[serde(default, rename = "columns")]
+    _columns: toml::Table,
     #[serde(default, rename = "payload_site")]
     sites: Vec<Spanned<SiteTable>>,
     #[serde(default, rename = "effect")]
