@@ -72,7 +72,7 @@ fn main() {
         }
         let answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
             if verbose {
-                println!("{line}")
+                println!("{line}");
             }
         });
         let found: Vec<String> = answer

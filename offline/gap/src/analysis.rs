@@ -214,14 +214,18 @@ fn analyse_with(
     }
     // A simulation with its input reversed says nothing of the robot: the robot's own numbers stand in for it.
     if quality.iter().any(|q| q.check == "input_sign" && q.level == Level::Fail && q.message.contains("simulation")) {
-        runs.iter_mut().for_each(|run| run.1 = None);
+        for run in &mut runs {
+            run.1 = None;
+        }
         apart.clear();
     }
     // With torques of their own they say what to believe of the robot, but not sample by sample.
     let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
     let from_recording = from_recording && !apart.is_empty();
     if !apart.is_empty() {
-        runs.iter_mut().for_each(|run| run.1 = None);
+        for run in &mut runs {
+            run.1 = None;
+        }
     }
     if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
         return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
@@ -330,7 +334,7 @@ enum Prior {
 }
 
 impl Prior {
-    fn put_on<'a>(self, problem: Problem<'a>) -> Problem<'a> {
+    fn put_on(self, problem: Problem) -> Problem {
         match self {
             Self::Believed => problem.believed_roughly(),
             Self::Drifting => problem.learnt_from_recording(),

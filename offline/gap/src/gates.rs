@@ -43,12 +43,15 @@ fn power(torque: &[f64], velocity: &[f64]) -> f64 {
     work / (rms(torque.iter().copied()) * rms(velocity.iter().copied()) * torque.len() as f64).max(1e-300)
 }
 
+/// A recording and its simulation.
+type Both = (Run, Option<Run>);
+
 /// Sign of torque against velocity: friction takes energy, so over a run every drive gives more than it gets back. A source
 /// whose joints all take energy has its input the other way round.
 fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
     let mut all = Vec::new();
     let n = robot.joint_count();
-    let mean_power = |of: &dyn Fn(&(Run, Option<Run>), usize) -> Option<f64>| -> Option<Vec<f64>> {
+    let mean_power = |of: &dyn Fn(&Both, usize) -> Option<f64>| -> Option<Vec<f64>> {
         (0..n)
             .map(|j| {
                 let each: Option<Vec<f64>> = runs.iter().map(|run| of(run, j)).collect();

@@ -7,13 +7,19 @@ use crate::robot::Robot;
 use crate::score::Scorer;
 use crate::search::Effect;
 
+/// Parameters and window as one replicate has them.
+type Replicate = (Vec<Named>, Window);
+
+/// An instant, s from the start of each run, with its 95 % interval.
+pub type Edge = (f64, [f64; 2]);
+
 /// What an effect amounts to.
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// Parameters, with their 95 % intervals.
     pub parameters: Vec<(Named, [f64; 2])>,
     /// Beginning and end, s from the start of each run, with their intervals; none where it does not begin or end in it.
-    pub window: Option<[Option<(f64, [f64; 2])>; 2]>,
+    pub window: Option<[Option<Edge>; 2]>,
     /// Coefficients of the candidate's columns.
     pub coefficients: Vec<f64>,
 }
@@ -83,7 +89,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
             };
             let (values, _) = of(&wide.coefficients);
             let replicates: Vec<(Vec<Named>, Window)> = wide.without.iter().map(|c| of(c)).collect();
-            let spread = |of: &dyn Fn(&(Vec<Named>, Window)) -> f64| -> f64 {
+            let spread = |of: &dyn Fn(&Replicate) -> f64| -> f64 {
                 let mean = replicates.iter().map(of).sum::<f64>() / blocks;
                 replicates.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>().sqrt()
             };

@@ -1,5 +1,6 @@
 //! Where a simulation and a recording of a robot differ, which physics is missing, and how large it is (gap-design.md).
 #![deny(missing_docs)]
+#![allow(clippy::needless_range_loop, reason = "cells, blocks and joints index several vectors and matrices at once")]
 
 pub mod filter;
 pub mod flexible;

@@ -196,7 +196,7 @@ mod tests {
         // Every other row of the grid is there, and the first two are one step apart.
         let step = motion.rows[1] - motion.rows[0];
         assert_eq!(step, 20);
-        assert!(motion.rows.iter().all(|i| (i - motion.rows[0]) % step == 0));
+        assert!(motion.rows.iter().all(|i| (i - motion.rows[0]).is_multiple_of(step)));
         assert_eq!(
             motion.rows.len(),
             (margin..2000 - margin)

@@ -26,7 +26,7 @@ pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidat
     std::thread::scope(|scope| {
         let other = scope.spawn(|| make(right));
         let mut all = make(left);
-        all.extend(other.join().expect("no panic in making columns"));
+        all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         all
     })
 }

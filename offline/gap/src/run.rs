@@ -198,7 +198,9 @@ impl Run {
                 let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
                 let mut joints = combine(&inverse, motor);
                 for (series, drive) in joints.iter_mut().zip(&robot.drives) {
-                    series.iter_mut().for_each(|q| *q += drive.offset);
+                    for q in series.iter_mut() {
+                        *q += drive.offset;
+                    }
                 }
                 joints
             }
@@ -302,7 +304,9 @@ impl Run {
         };
         if let Some(torque) = &mut self.torque {
             let mut holes = vec![false; length];
-            torque.iter_mut().for_each(|series| mark(&mut holes, &bridged(series, dt_s, HOLE_S)));
+            for series in torque.iter_mut() {
+                mark(&mut holes, &bridged(series, dt_s, HOLE_S));
+            }
             if !keep("tau", holes, &mut self.mask) {
                 self.torque = None;
             }

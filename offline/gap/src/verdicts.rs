@@ -115,7 +115,7 @@ pub(crate) fn outcome(
         all
     };
     let artifact = corrected.as_ref().map(|text| Artifact::new("corrected.toml", Format::Toml).sha256(sha256(text.as_bytes())));
-    report.inputs.channels = channels.clone();
+    report.inputs.channels.clone_from(&channels);
     let mut verdicts = Vec::new();
     for (k, (effect, estimate)) in effects.iter().zip(found.estimates).enumerate() {
         verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact.clone().expect("an effect has a model")));
@@ -470,8 +470,13 @@ fn remaining(found: &Found) -> Remaining {
 
 /// Hash of bytes in lower-case hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+
     use sha2::{Digest, Sha256};
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 /// For signatures that need nothing else.

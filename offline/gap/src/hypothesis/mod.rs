@@ -88,6 +88,7 @@ impl Family {
     }
 
     /// A form whose columns have a shape: names with whether they are refined, and where to begin.
+    #[expect(clippy::too_many_arguments, reason = "each is one field, and a table of forms reads best in one line each")]
     pub fn shaped(
         physics: &'static str,
         joints: &[usize],

@@ -120,7 +120,7 @@ impl<'a> Reader<'a> {
             if recording.columns[time].values.windows(2).all(|pair| pair[0] < pair[1]) {
                 recording.columns[..=time].rotate_right(1);
             } else {
-                recording.columns[time].name = "time_of_session_s".to_owned();
+                "time_of_session_s".clone_into(&mut recording.columns[time].name);
                 recording.columns[time].known = false;
             }
         }

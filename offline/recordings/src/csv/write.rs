@@ -25,7 +25,7 @@ pub struct Writer {
 
 enum Out {
     Plain(WholeFile),
-    Gzip(GzEncoder<WholeFile>),
+    Gzip(Box<GzEncoder<WholeFile>>),
 }
 
 impl Writer {
@@ -36,7 +36,7 @@ impl Writer {
     pub fn create(path: &Path, columns: &[TableColumn], metadata: &[(String, String)]) -> Result<Self, StreamError> {
         let file = WholeFile::create(path).map_err(|error| cannot_write(path, &error))?;
         let compressed = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
-        let out = if compressed { Out::Gzip(GzEncoder::new(file, Compression::new(LEVEL))) } else { Out::Plain(file) };
+        let out = if compressed { Out::Gzip(Box::new(GzEncoder::new(file, Compression::new(LEVEL)))) } else { Out::Plain(file) };
         let mut writer = Self { path: path.to_owned(), out, rows: Vec::new() };
         push_head(&mut writer.rows, columns, metadata);
         writer.flush_rows()?;
