@@ -136,12 +136,15 @@ pub fn analyse(
     options: &Options,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
-    let at_its_word = analyse_with(model, given, options, true, progress)?;
-    if given.iter().any(|one| one.sim.is_some()) || reaches_floor(&at_its_word.report) {
+    let simulated: Vec<_> =
+        given.iter().map(|one| if one.sim.is_some() { None } else { builtin::simulated(model, &one.real) }).collect();
+    let at_its_word = analyse_with(model, given, options, &simulated, progress)?;
+    let stands_in = simulated.iter().any(Option::is_some);
+    if !stands_in || reaches_floor(&at_its_word.report) {
         return Ok(at_its_word);
     }
     progress("the robot's numbers, believed roughly");
-    let roughly = analyse_with(model, given, options, false, progress)?;
+    let roughly = analyse_with(model, given, options, &[], progress)?;
     let unexplained = |outcome: &Outcome| match outcome.report.status {
         Status::NoMismatch | Status::Explained | Status::InsufficientData => 0,
         Status::PartlyExplained => 1,
@@ -168,7 +171,7 @@ fn analyse_with(
     model: &RobotModel,
     given: &[Given],
     options: &Options,
-    at_its_word: bool,
+    simulated: &[Option<Recording>],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
     let begun = Instant::now();
@@ -178,12 +181,12 @@ fn analyse_with(
     // Simulations that move otherwise, or at another time, than the recording.
     let mut apart: Vec<Run> = Vec::new();
     let mut from_recording = false;
-    for one in given {
+    for (k, one) in given.iter().enumerate() {
         let real = Run::new(&one.real, &robot)?;
         let sim = match &one.sim {
             Some((sim, _)) => Some(Run::new(sim, &robot)?),
-            None if at_its_word => builtin::simulated(model, &one.real).and_then(|sim| Run::new(&sim, &robot).ok()),
-            None => None,
+            // What stands in for it, where it can.
+            None => simulated.get(k).and_then(Option::as_ref).and_then(|sim| Run::new(sim, &robot).ok()),
         };
         let of_robot = |real: &Run, sim: &Run| one.sim.is_some() && as_noisy(real, sim) && !of_a_model(&robot, sim);
         runs.push(match sim {

@@ -129,6 +129,7 @@ fn cell_columns(dictionary: &Dictionary, c: usize) -> Vec<(&'static str, Column)
     let column = |series: Vec<f64>| {
         let mut column = Column::default();
         column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
+        column.silence(dictionary.problem);
         column
     };
     features(dictionary, cell)

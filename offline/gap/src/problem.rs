@@ -29,6 +29,44 @@ pub struct Cell {
     pub rows: Vec<(usize, usize)>,
     /// Recording minus simulation, N·m, N, rad or m.
     pub residual: Vec<f64>,
+    /// Places of the rows that say nothing, where residual and columns are 0: a drive is held by its friction, which takes
+    /// any force below its level.
+    pub silent: Vec<usize>,
+}
+
+impl Cell {
+    fn new(channel: Channel, index: usize) -> Self {
+        Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new() }
+    }
+
+    /// Makes a series 0 where the cell says nothing.
+    pub fn silence(&self, series: &mut [f64]) {
+        for &k in &self.silent {
+            series[k] = 0.0;
+        }
+    }
+}
+
+/// Share of its RMS speed below which a drive is held, and for how long it has to be, s.
+const HELD: f64 = 0.01;
+const HELD_S: f64 = 0.1;
+
+/// The samples at which a drive is held, with a margin for what smoothing carries over.
+fn held(motion: &Motion, drive: usize) -> Vec<bool> {
+    let speed = &motion.quick_velocity[drive];
+    let limit = HELD * crate::nominal::rms(speed.iter().copied());
+    let (least, margin) = ((HELD_S / motion.run.dt_s) as usize, (0.5 * HELD_S / motion.run.dt_s) as usize);
+    let mut held = vec![false; speed.len()];
+    let mut from = 0;
+    for i in 0..=speed.len() {
+        if i == speed.len() || speed[i].abs() > limit {
+            if i - from > least {
+                held[from.saturating_sub(margin)..(i + margin).min(speed.len())].fill(true);
+            }
+            from = i + 1;
+        }
+    }
+    held
 }
 
 /// Recording and simulation of one run on the same clock.
@@ -124,6 +162,7 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub fn learnt_from_recording(mut self) -> Self {
         self.nuisances = drifting(&self);
+        self.silence_nuisances();
         let of =
             |cell: &Cell| if cell.channel == Channel::JointTorque { BEYOND * self.nominal.torque_error[cell.index] } else { 0.0 };
         self.practical = self.cells.iter().map(of).collect();
@@ -135,6 +174,7 @@ impl<'a> Problem<'a> {
     #[must_use]
     pub fn believed_roughly(mut self) -> Self {
         self.nuisances = believed(&self);
+        self.silence_nuisances();
         self
     }
 
@@ -144,7 +184,7 @@ impl<'a> Problem<'a> {
             .map(|d| (d, coupling[(d, j)] * self.nominal.drives[d][2]))
             .filter(|(_, coulomb)| *coulomb != 0.0)
             .collect();
-        let mut cell = Cell { channel: Channel::JointTorque, index: j, rows: Vec::new(), residual: Vec::new() };
+        let mut cell = Cell::new(Channel::JointTorque, j);
         for (r, pair) in self.pairs.iter().enumerate() {
             let expected = |motion: &Motion, loads: &[Load]| -> Vec<f64> {
                 let signs: Vec<(f64, Vec<f64>)> = dry.iter().map(|(d, coulomb)| (*coulomb, sign_series(motion, *d))).collect();
@@ -161,15 +201,25 @@ impl<'a> Problem<'a> {
                     *out -= torque[j][i] - e;
                 }
             }
+            for motion in std::iter::once(&pair.real).chain(&pair.sim) {
+                for held in dry.iter().map(|(d, _)| held(motion, *d)) {
+                    let first = cell.rows.len();
+                    let silent = pair.real.rows.iter().enumerate().filter(|(_, i)| held[**i]);
+                    cell.silent.extend(silent.map(|(k, _)| first + k));
+                }
+            }
             cell.rows.extend(pair.real.rows.iter().map(|&i| (r, i)));
             cell.residual.extend(residual);
         }
+        let mut residual = std::mem::take(&mut cell.residual);
+        cell.silence(&mut residual);
+        cell.residual = residual;
         self.cells.push(cell);
     }
 
     fn push_transmission(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
         let [compliance, constant] = self.nominal.compliance[j];
-        let mut cell = Cell { channel: Channel::Transmission, index: j, rows: Vec::new(), residual: Vec::new() };
+        let mut cell = Cell::new(Channel::Transmission, j);
         for (r, pair) in self.pairs.iter().enumerate() {
             let deflection = &pair.real.deflection.as_ref().expect("checked by the caller")[j];
             let sim = pair.sim.as_ref().and_then(|sim| sim.deflection.as_ref()).zip(sim_loads[r].as_ref());
@@ -186,8 +236,7 @@ impl<'a> Problem<'a> {
     }
 
     fn push_tip(&mut self) {
-        let mut cells =
-            [0, 1, 2].map(|axis| Cell { channel: Channel::EndEffector, index: axis, rows: Vec::new(), residual: Vec::new() });
+        let mut cells = [0, 1, 2].map(|axis| Cell::new(Channel::EndEffector, axis));
         let mut ws = Workspace::new(&self.robot.arm);
         for (r, pair) in self.pairs.iter().enumerate() {
             let tip = pair.real.run.tip.as_ref().expect("checked by the caller");
@@ -247,6 +296,14 @@ impl<'a> Problem<'a> {
                     .collect()
             })
             .collect();
+    }
+
+    fn silence_nuisances(&mut self) {
+        for (cell, nuisance) in self.cells.iter().zip(&mut self.nuisances) {
+            for column in &mut nuisance.columns {
+                cell.silence(column);
+            }
+        }
     }
 
     /// Is there any cell of a channel?

@@ -44,8 +44,14 @@ const ALWAYS: [&str; 9] = [
     "frame_misalignment",
     "measurement_delay",
 ];
+/// Times its standard error over the blocks that the gain of an effect in a window has to reach.
+const SEEN_OFTEN: f64 = 2.0;
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
+
+/// Claims are close whose score is this share of the best, and as many are looked at again.
+const CLOSE: f64 = 0.9;
+const MOST_CLOSE: usize = 5;
 
 /// A candidate with what it gains beside the others chosen.
 #[derive(Debug, Clone)]
@@ -248,6 +254,7 @@ impl Search<'_, '_> {
         let alone = judged.amplitude.is_infinite();
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
+            && (scored.candidate.edges() == 0 || judged.gain.nats > SEEN_OFTEN * judged.gain.error)
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
@@ -365,8 +372,38 @@ impl Search<'_, '_> {
             }
         }
         sort(&mut claims);
+        self.told_apart(others, &mut claims);
         parsimonious(&mut claims, self.thresholds.equal);
         claims
+    }
+
+    /// The first claims, where they are close to each other, in the order of their gain over the noise that the best of them
+    /// leaves: what differs between close rivals is small, and drowns in the plain sum of squares.
+    fn told_apart(&self, others: &[Candidate], claims: &mut [Scored]) {
+        let Some(best) = claims.first().filter(|best| best.score > self.thresholds.nats) else { return };
+        let close = claims.iter().take(MOST_CLOSE).take_while(|s| s.score >= CLOSE * best.score).count();
+        if close < 2 {
+            return;
+        }
+        let grams = |scorer: &Scorer, one: Option<&Candidate>| {
+            others.iter().chain(one).fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns))
+        };
+        let fit = self.scorer.fit(&grams(&self.scorer, Some(&best.candidate)));
+        let scorer = Scorer::new(self.problem, self.noise_left(others, &best.candidate, &fit));
+        let base = scorer.fit(&grams(&scorer, None));
+        let over: Vec<f64> = claims[..close]
+            .iter()
+            .map(|s| scorer.gain(&base, &scorer.fit(&grams(&scorer, Some(&s.candidate)))).nats - price(&s.candidate))
+            .collect();
+        let most = over.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most <= 0.0 {
+            return;
+        }
+        let score = best.score;
+        for (claim, over) in claims[..close].iter_mut().zip(over) {
+            claim.score = score * over / most;
+        }
+        sort(&mut claims[..close]);
     }
 
     /// Windows to begin with: a beginning, an end, or both.
@@ -412,7 +449,8 @@ fn parsimonious(claims: &mut [Scored], equal: f64) {
 fn complexity(candidate: &Candidate) -> f64 {
     let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
     // What rounds a sign is not a claim of its own.
-    let rounding = candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "crossing")).count();
+    let rounding =
+        candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "settling" | "crossing")).count();
     (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
 }
 

@@ -66,7 +66,7 @@ fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64>
 fn total(dictionary: &Dictionary, j: usize) -> Column {
     let problem = dictionary.problem;
     let coulomb = problem.nominal.drives[j][2];
-    let sign = super::friction::turning(dictionary, j, 0.0);
+    let sign = super::friction::steep(dictionary, j);
     let load = dictionary.at_grid(|r, _, k| problem.loads[r][k].motor[j]);
     dictionary.effort_of(j, load.iter().zip(&sign).map(|(load, s)| load + coulomb * s).collect(), false)
 }

@@ -32,6 +32,13 @@ impl Column {
         }
     }
 
+    /// Makes it 0 where a cell says nothing.
+    pub fn silence(&mut self, problem: &Problem) {
+        for (cell, values) in &mut self.parts {
+            problem.cells[*cell].silence(values);
+        }
+    }
+
     /// The same within a window of each run only, s from its start.
     #[must_use]
     pub fn within(&self, problem: &Problem, [from_s, to_s]: Window) -> Self {

@@ -8,7 +8,7 @@ use crate::problem::Channel;
 /// Below break-away a bristle keeps its force, which a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 4] = [0.0, 0.0005, 0.003, 0.015];
 /// A sign of the motion with the number that rounds it.
-type Turn = fn(&Dictionary, usize, f64) -> Vec<f64>;
+type Turn = fn(&Dictionary, usize, &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
@@ -17,6 +17,8 @@ const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
 /// Exponents of the Stribeck curve.
 const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
 /// Time constants of heating, s.
+/// First guess of the time in which a bristle settles.
+const SETTLING_S: [f64; 1] = [0.004];
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
@@ -56,7 +58,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
         &[Bound::Positive],
         &[("v_eps", true)],
         product(&[&slowest]),
-        move |d, s| vec![d.effort_of(j, sign_below(d, j, s[0]), at_link)],
+        move |d, s| vec![d.effort_of(j, sign_below(d, j, s), at_link)],
     ));
     all.push(Family::shaped(
         "coulomb_friction",
@@ -64,22 +66,17 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
         form,
         TORQUE,
         &[Bound::Positive],
-        &[("presliding", true)],
-        product(&[&travels[1..]]),
-        move |d, s| vec![d.effort_of(j, turning(d, j, s[0]), at_link)],
+        &[("presliding", true), ("settling", true)],
+        product(&[&travels[1..], &SETTLING_S]),
+        move |d, s| vec![d.effort_of(j, turning(d, j, s), at_link)],
     ));
-    for (name, starts, sign) in [("v_eps", &slowest[..], sign_below as Turn), ("presliding", &travels[1..], turning as Turn)] {
+    let by_speed = (&[("v_eps", true)][..], product(&[&slowest]), sign_below as Turn);
+    let by_travel = (&[("presliding", true), ("settling", true)][..], product(&[&travels[1..], &SETTLING_S]), turning as Turn);
+    for (names, starts, sign) in [by_speed, by_travel] {
         all.push(
-            Family::shaped(
-                "load_dependent_friction",
-                &[j],
-                form,
-                TORQUE,
-                &[positive],
-                &[(name, true)],
-                product(&[starts]),
-                move |d, s| vec![by_load(d, &sign(d, j, s[0]))],
-            )
+            Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
+                vec![by_load(d, &sign(d, j, s))]
+            })
             .penalised(1.0),
         );
         all.push(
@@ -89,10 +86,10 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                 form,
                 TORQUE,
                 &[positive, positive],
-                &[(name, true)],
-                product(&[starts]),
+                names,
+                starts.clone(),
                 move |d, s| {
-                    let sign = sign(d, j, s[0]);
+                    let sign = sign(d, j, s);
                     vec![by_load(d, &sign), d.effort_of(j, sign, at_link)]
                 },
             )
@@ -106,9 +103,9 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     "friction fades",
                     TORQUE,
                     &[Bound::Free],
-                    &[("T", true), (name, true)],
-                    product(&[&HEATING_S, starts]),
-                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, s[1])), false)],
+                    &[&[("T", true)], names].concat(),
+                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t], &s[..]].concat())).collect(),
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, &s[1..])), false)],
                 )
                 .penalised(2.0),
             );
@@ -142,14 +139,12 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
-/// Sign of the motion, turning round over a presliding travel (Dahl), smoothed.
-pub(super) fn turning(dictionary: &Dictionary, j: usize, travel: f64) -> Vec<f64> {
+/// Sign of the motion, turning round over a presliding travel, smoothed; shape: that travel, and the time in which the vibration
+/// of such bristles settles (LuGre: `z + t zd`).
+fn turning(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
+    let (travel, settling_s) = (shape[0].max(1e-12), shape[1]);
     dictionary.smoothed(|r| {
         let motion = &dictionary.problem.pairs[r].real;
-        if travel <= 0.0 {
-            let eps = motion.sign_speed(j);
-            return motion.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect();
-        }
         let mut state = 0.0;
         motion.quick_velocity[j]
             .iter()
@@ -158,15 +153,20 @@ pub(super) fn turning(dictionary: &Dictionary, j: usize, travel: f64) -> Vec<f64
                 // Exact for a constant direction.
                 let limit = v.signum();
                 state = if moved == 0.0 { state } else { limit + (state - limit) * (-moved.abs()).exp() };
-                state
+                state + settling_s / travel * (v - v.abs() * state)
             })
             .collect()
     })
 }
 
-/// Sign of the velocity, turning over `eps`, smoothed.
-fn sign_below(dictionary: &Dictionary, j: usize, eps: f64) -> Vec<f64> {
-    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / eps).tanh()).collect())
+/// Sign of the velocity as steep as its noise allows, smoothed.
+pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
+    sign_below(dictionary, j, &[dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max)])
+}
+
+/// Sign of the velocity, turning over `v_eps`, smoothed.
+fn sign_below(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
+    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / shape[0]).tanh()).collect())
 }
 
 /// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, `v_eps`.
@@ -175,7 +175,7 @@ fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<
         let curve = |v: &f64| (v / shape[2]).tanh() * (-(v.abs() / shape[0]).powf(shape[1])).exp();
         dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(curve).collect()
     });
-    (sign_below(dictionary, j, shape[2]), extra)
+    (sign_below(dictionary, j, &shape[2..]), extra)
 }
 
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.

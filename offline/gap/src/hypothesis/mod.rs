@@ -161,6 +161,9 @@ impl Candidate {
     /// Makes the columns.
     pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], window: Option<Window>) -> Self {
         let mut columns = (family.columns)(dictionary, shape);
+        for column in &mut columns {
+            column.silence(dictionary.problem);
+        }
         if let Some(window) = window {
             for column in &mut columns {
                 *column = column.within(dictionary.problem, window);

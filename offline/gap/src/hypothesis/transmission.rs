@@ -301,6 +301,14 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         })
         .penalised(1.5),
     );
+    all.push(
+        Family::fixed("transmission_ratio", &[j], "about where it was homed, torque too", TRANSMISSION, &[small, free], move |d| {
+            let mut column = ratio(d);
+            column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+            vec![column, offset(d, j)]
+        })
+        .penalised(1.5),
+    );
     let travel = dictionary.travel(j);
     // A bend in points that a camera saw is mostly play or the camera.
     let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
