@@ -70,7 +70,7 @@ fn main() {
                 println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::nominal::rms(cell.residual.iter().copied()));
             }
         }
-        let answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
+        let mut answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
             if verbose {
                 println!("{line}");
             }
@@ -85,8 +85,13 @@ fn main() {
             .collect();
         let right = match (effects.as_slice(), answer.effects.as_slice()) {
             ([], []) => true,
-            ([e], [only]) => e.0 == only.chosen.candidate.family.physics,
-            _ => false,
+            (told, named) => {
+                let mut told: Vec<&str> = told.iter().map(|e| e.0.as_str()).collect();
+                let mut named: Vec<&str> = named.iter().map(|e| e.chosen.candidate.family.physics).collect();
+                told.sort_unstable();
+                named.sort_unstable();
+                told == named
+            }
         };
         let mut line = String::new();
         let severity = truth["severity"].as_f64().unwrap_or(0.0);
@@ -116,6 +121,32 @@ fn main() {
         } else if let Some(next) = &answer.next {
             let _ = write!(line, "  [next {}{:?} {:.1}]", next.candidate.family.physics, next.candidate.family.joints, next.score);
         }
+        let left: Vec<String> = (0..problem.cells.len())
+            .map(|c| {
+                let mut left = problem.cells[c].residual.clone();
+                let mut start = 0;
+                for effect in &answer.effects {
+                    let columns = effect.chosen.candidate.columns.len();
+                    let theta = &answer.fit.coefficients[start..start + columns];
+                    start += columns;
+                    left.iter_mut().zip(effect.chosen.candidate.effect(c, theta)).for_each(|(y, p)| *y -= p);
+                }
+                let floor = gap::verdicts::floor(&problem.cells[c]);
+                let before = gap::nominal::rms(problem.cells[c].residual.iter().copied());
+                format!("{:.2}/{:.2}", before / floor, gap::nominal::rms(left.into_iter()) / floor)
+            })
+            .collect();
+        let ceiling = gap::flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
+        let _ = write!(
+            line,
+            " ceiling: library {:.0} together {:.0} least {:.0} cell {:?} by {:?}; left {}",
+            ceiling.library_nats,
+            ceiling.together_nats,
+            ceiling.least_nats,
+            ceiling.cell,
+            ceiling.depends_on,
+            left.join(" ")
+        );
         let _ = write!(line, " {:.1} s", begun.elapsed().as_secs_f64());
         if verbose {
             println!("truth {truth}");

@@ -23,12 +23,13 @@ use crate::{experiment, regime};
 /// Noise of a cell, from how much it differs three rows apart: half of them by less than noise gives, so that effects, which
 /// change slowly or seldom, do not count (the median of |x| is 0.6745 standard deviations).
 pub fn floor(cell: &Cell) -> f64 {
-    let mut steps: Vec<f64> = cell
-        .rows
-        .windows(4)
-        .zip(cell.residual.windows(4))
-        .filter(|(rows, _)| rows[0].0 == rows[3].0)
-        .map(|(_, y)| (y[3] - y[0]).abs())
+    let mut says = vec![true; cell.rows.len()];
+    for &k in &cell.silent {
+        says[k] = false;
+    }
+    let mut steps: Vec<f64> = (3..cell.rows.len())
+        .filter(|&k| cell.rows[k - 3].0 == cell.rows[k].0 && says[k - 3] && says[k])
+        .map(|k| (cell.residual[k] - cell.residual[k - 3]).abs())
         .collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).map_or(0.0, |median| median / 0.6745 / std::f64::consts::SQRT_2)

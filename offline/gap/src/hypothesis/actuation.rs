@@ -5,7 +5,7 @@ use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
 /// Speed below which a joint creeps, of its RMS speed.
-const CREEPING: f64 = 0.1;
+const CREEPING: f64 = 0.01;
 /// Most waves per motor turn.
 const ORDERS: u32 = 64;
 
