@@ -14,7 +14,7 @@ use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, alike, as_noisy, common};
-use crate::search::{Answer, Thresholds, search};
+use crate::search::{Answer, Effect, Thresholds, search};
 use crate::{builtin, corrected, flexible, verdicts};
 
 /// One run as it was given.
@@ -307,8 +307,11 @@ fn analyse_with(
         unmodelled,
     };
     progress("judging on what was held out");
-    let corrected =
-        (!answer.effects.is_empty()).then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
+    let corrected = answer
+        .effects
+        .iter()
+        .any(Effect::is_named)
+        .then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
     let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected);
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);

@@ -134,6 +134,8 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("external_contact", _) => {
             vec![named("k", "N/m", theta[0]), named("x_0", "m", shaped("x_0")), named("p", "1", shaped("p"))]
         }
+        // What has no name has no parameters.
+        (crate::hypothesis::UNMODELLED, _) => Vec::new(),
         (physics, form) => unreachable!("{physics} ({form}) has no parameters here"),
     }
 }

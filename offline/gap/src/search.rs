@@ -79,6 +79,13 @@ pub struct Effect {
     pub share: f64,
 }
 
+impl Effect {
+    /// Has the vocabulary a name for it?
+    pub fn is_named(&self) -> bool {
+        self.chosen.candidate.family.physics != crate::hypothesis::UNMODELLED
+    }
+}
+
 /// How a candidate stands beside others.
 #[derive(Debug, Clone, Copy)]
 struct Judged {

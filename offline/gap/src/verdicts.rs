@@ -10,7 +10,7 @@ use gap_report::{
 };
 
 use crate::analysis::{Found, Given, Options, Outcome};
-use crate::hypothesis::Candidate;
+use crate::hypothesis::{Candidate, UNMODELLED};
 use crate::intervals::Estimate;
 use crate::nominal::rms;
 use crate::pictures;
@@ -119,9 +119,14 @@ pub(crate) fn outcome(
     report.inputs.channels.clone_from(&channels);
     let mut verdicts = Vec::new();
     for (k, (effect, estimate)) in effects.iter().zip(found.estimates).enumerate() {
-        verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact.clone().expect("an effect has a model")));
+        if let Some(artifact) = artifact.clone().filter(|_| effect.is_named()) {
+            verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact));
+        } else {
+            verdicts.push(unnamed(found, k, effect, estimate));
+        }
     }
-    if found.unmodelled {
+    let unnamed = effects.iter().any(|effect| !effect.is_named());
+    if found.unmodelled && !unnamed {
         verdicts.push(unmodelled(found, effects.len() as u64 + 1));
     }
     if verdicts.is_empty() {
@@ -134,7 +139,7 @@ pub(crate) fn outcome(
         let probability = 1.0 / (1.0 + ((nats - thresholds.nats) / 2.0).exp());
         verdicts.push(Verdict::none(probability.clamp(0.5, 0.999), channels[0], vec![evidence]));
     }
-    report.status = match (effects.is_empty(), found.unmodelled) {
+    report.status = match (!effects.iter().any(Effect::is_named), found.unmodelled || unnamed) {
         (true, false) => Status::NoMismatch,
         (true, true) => Status::Unmodelled,
         (false, false) => Status::Explained,
@@ -235,7 +240,8 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let number = k as u64 + 1;
     let best = effect.chosen.score;
     let near = (0.01 * best).max(3.0);
-    let close: Vec<&Scored> = effect.rivals.iter().filter(|r| r.score > best - near).take(4).collect();
+    let named = |r: &&Scored| r.candidate.family.physics != UNMODELLED;
+    let close: Vec<&Scored> = effect.rivals.iter().filter(named).filter(|r| r.score > best - near).take(4).collect();
     let total = weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0);
     let probability = weight(best, best) / total;
     let candidate = &effect.chosen.candidate;
@@ -276,7 +282,7 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
         verdict = verdict.confusable(with, set.min(1.0), experiment::suggest(found.robot, candidate, &close, rivals));
     }
     verdict.summary = Some(gap_report::headline(&verdict));
-    let alternatives = effect.rivals.iter().take(3).filter(|r| weight(best, r.score) / total > 0.005).map(|rival| {
+    let alternatives = effect.rivals.iter().filter(named).take(3).filter(|r| weight(best, r.score) / total > 0.005).map(|rival| {
         let place = Location::new(
             told(rival.candidate.family.channel),
             joints(found.robot, &rival.candidate),
@@ -456,14 +462,34 @@ fn unmodelled(found: &Found, number: u64) -> Verdict {
     Verdict::unmodelled(number, (1.0 - share).clamp(0.5, 0.99), location, evidence)
 }
 
+/// The verdict of an effect that the vocabulary has no name for.
+fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Verdict {
+    let candidate = &effect.chosen.candidate;
+    let cell = &found.problem.cells[main_cell(found, candidate, &estimate.coefficients)];
+    let regime = Regime::new(Feature::All, format!("depends on {}", candidate.family.form));
+    let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), Subsystem::Unknown, regime);
+    location.energy_share = Some(effect.share.clamp(0.0, 1.0));
+    let best = effect.chosen.score;
+    let total = weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0);
+    let claim = format!("a term in {} explains more than every physics that has a name", candidate.family.form);
+    let evidence =
+        Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
+    Verdict::unmodelled(k as u64 + 1, (weight(best, best) / total).clamp(0.01, 0.999), location, evidence)
+}
+
 fn remaining(found: &Found) -> Remaining {
     let ceiling = found.ceiling;
+    let unnamed: Vec<&str> =
+        found.answer.effects.iter().filter(|e| !e.is_named()).map(|e| e.chosen.candidate.family.form).collect();
     let share = if ceiling.together_nats > 0.0 { (ceiling.library_nats / ceiling.together_nats).clamp(0.0, 1.0) } else { 1.0 };
     Remaining {
         library_gain_nats: ceiling.library_nats,
         flexible_gain_nats: ceiling.together_nats,
         explained_share: Some(share),
-        depends_on: found.unmodelled.then(|| ceiling.depends_on.iter().map(|d| (*d).to_owned()).collect()),
+        depends_on: (found.unmodelled || !unnamed.is_empty()).then(|| {
+            let all = unnamed.into_iter().chain(ceiling.depends_on.iter().copied().filter(|_| found.unmodelled));
+            all.map(str::to_owned).collect()
+        }),
         fit: None,
         extra: gap_report::Extra::default(),
     }

@@ -8,6 +8,9 @@ mod inertial;
 mod kinematic;
 mod timing;
 mod transmission;
+mod unknown;
+
+pub use unknown::UNMODELLED;
 
 use std::sync::Arc;
 
@@ -227,6 +230,7 @@ pub fn library(dictionary: &Dictionary) -> Vec<Arc<Family>> {
     kinematic::push(dictionary, &mut all);
     timing::push(dictionary, &mut all);
     environment::push(dictionary, &mut all);
+    unknown::push(dictionary, &mut all);
     all.into_iter().map(Arc::new).collect()
 }
 
