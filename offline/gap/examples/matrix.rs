@@ -136,6 +136,7 @@ fn main() {
                 format!("{:.2}/{:.2}", before / floor, gap::nominal::rms(left.into_iter()) / floor)
             })
             .collect();
+        let _ = write!(line, " controller {:?}", gap::controller::changed(&problem));
         let ceiling = gap::flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
         let _ = write!(
             line,

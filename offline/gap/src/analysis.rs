@@ -98,6 +98,8 @@ pub struct Found<'a> {
     pub floors: &'a [f64],
     /// Likeliest values of what is known only roughly, per cell.
     pub beside: &'a [Vec<f64>],
+    /// A controller that is not the simulation's.
+    pub controller: Option<crate::controller::Changed>,
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
 }
@@ -304,6 +306,7 @@ fn analyse_with(
         ceiling: &ceiling,
         floors: &floors,
         beside: &beside,
+        controller: given.iter().all(|one| one.sim.is_some()).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,
     };
     progress("judging on what was held out");

@@ -22,6 +22,7 @@ pub mod search;
 pub mod analysis;
 mod breakaway;
 pub mod builtin;
+pub mod controller;
 mod corrected;
 mod experiment;
 mod gates;

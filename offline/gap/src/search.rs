@@ -380,7 +380,7 @@ impl Search<'_, '_> {
         }
         sort(&mut claims);
         self.told_apart(others, &mut claims);
-        parsimonious(&mut claims, self.thresholds.equal);
+        parsimonious(&mut claims, self.thresholds.equal, self.problem.robot.joint_count() - 1);
         claims
     }
 
@@ -440,12 +440,21 @@ fn price(candidate: &Candidate) -> f64 {
     candidate.family.penalty_nats + [0.0, 8.0, 20.0][candidate.edges().min(2)]
 }
 
+/// A claim that holds another one and more, and the share of its score by which it has to be better.
+const HOLDS: (&str, &str, f64) = ("link_inertia", "payload", 0.03);
+
 /// Brings the simplest of those that are as good as the best to the front.
-fn parsimonious(claims: &mut [Scored], equal: f64) {
+fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
     let Some(best) = claims.first() else { return };
-    let within = best.score - (equal * best.score.abs()).max(3.0);
+    let score = best.score;
+    // A payload hangs on the last link.
+    let held = best.candidate.family.physics == HOLDS.0 && best.candidate.family.joints == [last_link];
+    let good = |claim: &Scored| {
+        let share = if held && claim.candidate.family.physics == HOLDS.1 { HOLDS.2 } else { equal };
+        claim.score >= score - (share * score.abs()).max(3.0)
+    };
     let simplest = (0..claims.len())
-        .take_while(|k| claims[*k].score >= within)
+        .filter(|k| good(&claims[*k]))
         .min_by(|a, b| complexity(&claims[*a].candidate).total_cmp(&complexity(&claims[*b].candidate)));
     if let Some(k) = simplest {
         claims[..=k].rotate_right(1);

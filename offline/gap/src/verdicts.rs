@@ -10,6 +10,7 @@ use gap_report::{
 };
 
 use crate::analysis::{Found, Given, Options, Outcome};
+use crate::controller::Changed;
 use crate::hypothesis::{Candidate, UNMODELLED};
 use crate::intervals::Estimate;
 use crate::nominal::rms;
@@ -125,7 +126,10 @@ pub(crate) fn outcome(
             verdicts.push(unnamed(found, k, effect, estimate));
         }
     }
-    let unnamed = effects.iter().any(|effect| !effect.is_named());
+    let unnamed = found.controller.is_some() || effects.iter().any(|effect| !effect.is_named());
+    if let Some(changed) = found.controller {
+        verdicts.push(another_controller(found, effects.len() as u64 + 1, changed));
+    }
     if found.unmodelled && !unnamed {
         verdicts.push(unmodelled(found, effects.len() as u64 + 1));
     }
@@ -462,6 +466,21 @@ fn unmodelled(found: &Found, number: u64) -> Verdict {
     Verdict::unmodelled(number, (1.0 - share).clamp(0.5, 0.99), location, evidence)
 }
 
+/// The verdict of a controller that is not the simulation's.
+fn another_controller(found: &Found, number: u64, changed: Changed) -> Verdict {
+    let unit = if found.robot.prismatic[changed.joint] { "N" } else { "N.m" };
+    let [missed, left] = changed.missed;
+    let regime = Regime::new(Feature::All, "depends on tracking error".to_owned());
+    let joint = vec![found.robot.joints[changed.joint].clone()];
+    let claim = format!(
+        "the simulation's control law misses the recorded torque by {missed:.3e} {unit} RMS, {left:.1e} with {:.2} times its \
+         proportional gain",
+        changed.gain
+    );
+    let evidence = Evidence::new("control law learnt from the simulation", claim, (missed, unit), TestMethod::HeldOutGain);
+    Verdict::unmodelled(number, 0.9, Location::new(Told::Command, joint, Subsystem::Controller, regime), evidence)
+}
+
 /// The verdict of an effect that the vocabulary has no name for.
 fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Verdict {
     let candidate = &effect.chosen.candidate;
@@ -479,13 +498,22 @@ fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Ver
 
 fn remaining(found: &Found) -> Remaining {
     let ceiling = found.ceiling;
-    let unnamed: Vec<&str> =
-        found.answer.effects.iter().filter(|e| !e.is_named()).map(|e| e.chosen.candidate.family.form).collect();
+    let unnamed: Vec<&str> = found
+        .answer
+        .effects
+        .iter()
+        .filter(|e| !e.is_named())
+        .map(|e| e.chosen.candidate.family.form)
+        .chain(found.controller.map(|_| "tracking error"))
+        .collect();
+    // Of what was gained, the part that has names.
+    let gained = |named: bool| found.answer.effects.iter().filter(|e| !named || e.is_named()).map(|e| e.gain.nats).sum::<f64>();
+    let named = if found.answer.effects.is_empty() { 1.0 } else { gained(true) / gained(false).max(1e-9) };
     let share = if ceiling.together_nats > 0.0 { (ceiling.library_nats / ceiling.together_nats).clamp(0.0, 1.0) } else { 1.0 };
     Remaining {
         library_gain_nats: ceiling.library_nats,
         flexible_gain_nats: ceiling.together_nats,
-        explained_share: Some(share),
+        explained_share: Some((share * named).clamp(0.0, 1.0)),
         depends_on: (found.unmodelled || !unnamed.is_empty()).then(|| {
             let all = unnamed.into_iter().chain(ceiling.depends_on.iter().copied().filter(|_| found.unmodelled));
             all.map(str::to_owned).collect()

@@ -41,20 +41,16 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         move |d, s| vec![point_column(d, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
     );
     all.push(somewhere.stepped(&[None, Some(0.04), Some(0.04), Some(0.04)]).penalised(3.0));
-    // Mass and first moment free; inertia about the origin of a small body follows from them only roughly, and weighs little.
-    all.push(
-        Family::shaped(
-            "payload",
-            &[],
-            "anywhere on the last link",
-            TORQUE,
-            &[Bound::Positive, Bound::Free, Bound::Free, Bound::Free],
-            &[("link", false)],
-            vec![vec![last as f64]],
-            move |d, s| (0..4).map(|k| parameter_column(d, s[0] as usize, k)).collect(),
-        )
-        .penalised(3.0),
-    );
+    // Mass and first moment free; its second moments are those of a point where the two put it.
+    let bounds = [Bound::Positive, Bound::Free, Bound::Free, Bound::Free];
+    let moments = ["mass", "moment_x", "moment_y", "moment_z"];
+    let anywhere = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &moments, move |d, s| {
+        let place = if s[0] > 0.0 { Vector3::new(s[1], s[2], s[3]) / s[0] } else { Vector3::zeros() };
+        let mut of_mass = LinkInertia::point(1.0, place).parameters();
+        of_mass[1..4].fill(0.0);
+        std::iter::once(weighted_column(d, last, &of_mass)).chain((1..4).map(|k| parameter_column(d, last, k))).collect()
+    });
+    all.push(anywhere.penalised(3.0));
     // The links of one robot are the same in two recordings of it.
     let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
