@@ -194,6 +194,17 @@ impl<'a> Dictionary<'a> {
         self.deflection(&all)
     }
 
+    /// A deflection of one drive's cable: joints whose position is read through others' cables see their share.
+    pub fn strain_of(&self, drive: usize, series: Vec<f64>) -> Column {
+        let n = self.joints();
+        let shares = self.problem.robot.coupling().try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
+        let of = |joint: usize| match shares[(joint, drive)] {
+            share if joint == drive || share == 0.0 => (joint == drive).then(|| series.clone()),
+            share => Some(series.iter().map(|x| share * x).collect()),
+        };
+        self.deflection(&(0..n).map(of).collect::<Vec<_>>())
+    }
+
     /// A torque of one joint; not at the link: of its drive, which its cables carry to the joints that they pass.
     pub fn effort_of(&self, joint: usize, series: Vec<f64>, at_link: bool) -> Column {
         let mut all = vec![None; self.joints()];
