@@ -62,7 +62,7 @@ pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[
     let driven = driven
         .map_err(|why| {
             if in_loop.is_none() {
-                told(format!("with the recorded torque: {why}"))
+                told(format!("with the recorded torque: {why}"));
             }
         })
         .ok();

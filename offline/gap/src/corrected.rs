@@ -23,8 +23,8 @@ pub(crate) struct Corrected {
 impl Corrected {
     /// Text of corrected.toml; what is not in it stands in its first lines.
     pub(crate) fn to_toml(&self) -> String {
-        let told: String = self.left_out.iter().map(|why| format!("# Not in this model: {why}.\n")).collect();
-        told + &self.after.to_toml()
+        let told: Vec<String> = self.left_out.iter().map(|why| format!("# Not in this model: {why}.\n")).collect();
+        told.concat() + &self.after.to_toml()
     }
 }
 

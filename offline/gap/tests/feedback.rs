@@ -143,11 +143,6 @@ fn found_out(physics: &str, main: &str, (corrected, others): &(RobotModel, [Reco
 }
 
 #[test]
-fn dry_friction_is_fed_back() {
-    found_out("coulomb_friction", "f_c", &fed_back("coulomb_friction", Bound::Joint(2), &[("f_c", 8.0)]));
-}
-
-#[test]
 fn viscous_friction_is_fed_back() {
     found_out("viscous_friction", "b", &fed_back("viscous_friction", Bound::Joint(1), &[("b", 3.0)]));
 }

@@ -198,11 +198,11 @@ impl<'a> Dictionary<'a> {
     pub fn strain_of(&self, drive: usize, series: Vec<f64>) -> Column {
         let n = self.joints();
         let shares = self.problem.robot.coupling().try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
-        let of = |joint: usize| match shares[(joint, drive)] {
-            share if joint == drive || share == 0.0 => (joint == drive).then(|| series.clone()),
-            share => Some(series.iter().map(|x| share * x).collect()),
-        };
-        self.deflection(&(0..n).map(of).collect::<Vec<_>>())
+        let share = |joint: usize| shares[(joint, drive)];
+        let of = |joint: usize| (share(joint) != 0.0).then(|| series.iter().map(|x| share(joint) * x).collect());
+        let mut all: Vec<Option<Vec<f64>>> = (0..n).map(|joint| if joint == drive { None } else { of(joint) }).collect();
+        all[drive] = Some(series);
+        self.deflection(&all)
     }
 
     /// A torque of one joint; not at the link: of its drive, which its cables carry to the joints that they pass.
