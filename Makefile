@@ -33,7 +33,7 @@ stage: build offline
 
 install:
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose
-	install -d $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/ravenpose/models $(DESTDIR)$(PREFIX)/share/doc/ravenpose
+	install -d $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/ravenpose/models/examples $(DESTDIR)$(PREFIX)/share/doc/ravenpose
 	install -m 755 target/release/ravenposed $(DESTDIR)$(PREFIX)/bin/
 	if [ -x target/release/ravenpose ]; then install -m 755 target/release/ravenpose $(DESTDIR)$(PREFIX)/bin/; fi
 	for p in ravenpose-generate ravenpose-score; do if [ -x target/release/$$p ]; then install -m 755 target/release/$$p $(DESTDIR)$(PREFIX)/bin/; fi; done
@@ -44,7 +44,8 @@ install:
 	sed -e 's|@PREFIX@|$(PREFIX)|' -e 's|@VERSION@|$(VERSION)|' bridge/pkgconfig/ravenpose.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/ravenpose.pc
 	install -m 644 bridge/cmake/ravenposeConfig.cmake $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/
 	sed -e 's|@VERSION@|$(VERSION)|' bridge/cmake/ravenposeConfigVersion.cmake.in > $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/ravenposeConfigVersion.cmake
-	install -m 644 models/raven2-plant.toml models/raven2-worn.toml models/raven2-uiuc-fit.toml models/gap-vocabulary.json $(DESTDIR)$(PREFIX)/share/ravenpose/models/
+	install -m 644 models/raven2-*.toml models/gap-vocabulary.json models/gap-report.schema.json $(DESTDIR)$(PREFIX)/share/ravenpose/models/
+	install -m 644 models/examples/*.toml $(DESTDIR)$(PREFIX)/share/ravenpose/models/examples/
 	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
 

@@ -21,13 +21,13 @@ pub(crate) fn run(core: Option<usize>, priority: i32, spins: bool, seconds: u64)
         show(finding);
     }
     let count = |level: Level| findings.iter().filter(|finding| finding.level == level).count();
-    println!("\n{} requirements not met, {} warnings, {} checks", count(Level::Fail), count(Level::Warn), findings.len());
+    say!("\n{} requirements not met, {} warnings, {} checks", count(Level::Fail), count(Level::Warn), findings.len());
     Ok(if count(Level::Fail) == 0 { ExitCode::SUCCESS } else { ExitCode::from(NOT_READY) })
 }
 
 fn show(finding: &Finding) {
-    println!("{:4}  {:18} {}", finding.level.to_string(), finding.id, finding.found);
+    say!("{:4}  {:18} {}", finding.level.to_string(), finding.id, finding.found);
     if let Some(remedy) = &finding.remedy {
-        println!("      {:18} -> {remedy}", "");
+        say!("      {:18} -> {remedy}", "");
     }
 }

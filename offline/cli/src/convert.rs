@@ -35,7 +35,7 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>) -> Result<ExitCod
         (_, None, None) => return Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
     };
     let Some(damage) = damage else { return Ok(ExitCode::SUCCESS) };
-    eprintln!(
+    complain!(
         "ravenpose: {}: {}: {}; what stands before it was converted, the rest is lost",
         input.display(),
         damage.place,
@@ -58,7 +58,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 
 fn note_all(losses: &[&str]) {
     for loss in losses {
-        println!("note: {loss}");
+        say!("note: {loss}");
     }
 }
 
@@ -76,7 +76,7 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
         return Err(format!("{}: {why}; nothing was written", input.display()));
     }
     sink.finish().map_err(|error| error.to_string())?;
-    println!("{}: {records} records", out.display());
+    say!("{}: {records} records", out.display());
     Ok(source.damage().cloned())
 }
 
@@ -95,7 +95,7 @@ fn table_to_table(mut source: Box<dyn TableSource>, out: &Path, format: TableFor
     progress.end();
     let rows = rows.map_err(|error| error.to_string())?;
     sink.finish().map_err(|error| error.to_string())?;
-    println!("{}: {rows} rows, {} columns", out.display(), columns.len());
+    say!("{}: {rows} rows, {} columns", out.display(), columns.len());
     Ok(source.damage().cloned())
 }
 
@@ -104,7 +104,7 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) ->
     let recording = strict(input)?;
     let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
     for note in &made.notes {
-        println!("note: {note}");
+        say!("note: {note}");
     }
     note_all(format.losses());
     let metadata: Vec<(String, String)> = recording.metadata.clone().into_iter().collect();
@@ -120,7 +120,7 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) ->
         }
     }
     sink.finish().map_err(|error| error.to_string())?;
-    println!("{}: {} states, {:.3} s", out.display(), made.states.len(), made.states.len() as f64 * 1e-3);
+    say!("{}: {} states, {:.3} s", out.display(), made.states.len(), made.states.len() as f64 * 1e-3);
     Ok(())
 }
 

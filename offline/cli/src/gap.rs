@@ -1,9 +1,10 @@
 //! `ravenpose gap`: where simulation and recordings differ, and which physics is missing.
 
 use crate::output;
-use ::gap::analysis::{Given, Options, analyse};
+use ::gap::analysis::{Given, Options, Outcome, analyse};
 use ::gap::search::Thresholds;
 use ::gap::verdicts::sha256;
+use ::gap::watch;
 use arm::Side;
 use gap_report::Status;
 use recordings::open::{Kind, Opened, kind, open};
@@ -30,6 +31,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) seed: u64,
     /// Say what the search tries.
     pub(crate) trace: bool,
+    /// Look at the newest minute of one recording again and again.
+    pub(crate) watch: bool,
 }
 
 /// Progress is shown on a terminal, and only of what takes longer.
@@ -65,33 +68,79 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         config_sha256: sha256(format!("{text}{thresholds:?}{}", wish.seed).as_bytes()),
         urdf_sha256: urdf.map(|path| hash(Path::new(path))).transpose()?,
     };
+    if wish.watch {
+        let [only] = given.as_slice() else { return Err("--watch looks at one recording; give one --real".to_owned()) };
+        return watched(&model, only, &options, wish.out);
+    }
+    let outcome = quietly(&model, &given, &options)?;
+    write(&outcome, wish.out)?;
+    output::say(format_args!("{}", gap_report::words(&outcome.report)));
+    if !outcome.left_out.is_empty() {
+        say!("note: corrected.toml is without {} of the effects above; its first lines say which and why", outcome.left_out.len());
+    }
+    say!("{}", wish.out.join("report.html").display());
+    Ok(status(outcome.report.status))
+}
+
+fn status(status: Status) -> ExitCode {
+    match status {
+        Status::NoMismatch => ExitCode::SUCCESS,
+        Status::InsufficientData => ExitCode::from(2),
+        _ => ExitCode::from(1),
+    }
+}
+
+/// The analysis with its progress on a terminal.
+fn quietly(model: &RobotModel, given: &[Given], options: &Options) -> Result<Outcome, String> {
     let (begun, terminal) = (Instant::now(), std::io::stderr().is_terminal());
-    let outcome = analyse(&model, &given, &options, &mut |what| {
+    let outcome = analyse(model, given, options, &mut |what| {
         if terminal && begun.elapsed() > PATIENCE {
-            eprint!("\r\x1b[K{what} ({:.0} s)", begun.elapsed().as_secs_f64());
+            output::complain(format_args!("\r\x1b[K{what} ({:.0} s)", begun.elapsed().as_secs_f64()));
         }
     });
     if terminal && begun.elapsed() > PATIENCE {
-        eprint!("\r\x1b[K");
+        output::complain(format_args!("\r\x1b[K"));
     }
-    let outcome = outcome.map_err(|error| error.to_string())?;
+    outcome.map_err(|error| error.to_string())
+}
+
+/// Report, page and corrected model in their folder.
+fn write(outcome: &Outcome, out: &Path) -> Result<(), String> {
     // What cannot be written at all leaves nothing behind.
     drop(gap_report::json(&outcome.report).map_err(|error| error.to_string())?);
-    std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
-    let corrected = wish.out.join("corrected.toml");
+    std::fs::create_dir_all(out).map_err(|error| format!("{}: cannot be made: {error}", out.display()))?;
+    let corrected = out.join("corrected.toml");
     match &outcome.corrected {
         Some(text) => output::whole(&corrected, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?,
         // One of an earlier analysis would pass for this one's.
         None => drop(std::fs::remove_file(&corrected)),
     }
-    gap_report::write(&outcome.report, &outcome.pictures, wish.out).map_err(|error| error.to_string())?;
-    print!("{}", gap_report::words(&outcome.report));
-    println!("{}", wish.out.join("report.html").display());
-    Ok(match outcome.report.status {
-        Status::NoMismatch => ExitCode::SUCCESS,
-        Status::InsufficientData => ExitCode::from(2),
-        _ => ExitCode::from(1),
-    })
+    gap_report::write(&outcome.report, &outcome.pictures, out).map_err(|error| error.to_string())
+}
+
+/// One line per window of a recording; the report is that of the last window in which the robot was not its model, else of the
+/// last one. The status is that of the report.
+fn watched(model: &RobotModel, given: &Given, options: &Options, out: &Path) -> Result<ExitCode, String> {
+    let mut told: Option<Outcome> = None;
+    for end_s in watch::ends(&given.real) {
+        let real = watch::newest(&given.real, end_s);
+        let from_s = real.time_s().and_then(|time| time.first().copied()).unwrap_or(end_s);
+        let sim = given.sim.as_ref().map(|(sim, hash)| (watch::newest(sim, end_s), hash.clone()));
+        let (id, real_sha256) = (given.id.clone(), given.real_sha256.clone());
+        let window = Given { id, real, real_sha256, notes: given.notes.clone(), sim };
+        let outcome = quietly(model, &[window], options)?;
+        if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {}\n", gap_report::headlines(&outcome.report).join(" "))) {
+            break;
+        }
+        let differs = |outcome: &Outcome| !matches!(outcome.report.status, Status::NoMismatch | Status::InsufficientData);
+        if differs(&outcome) || !told.as_ref().is_some_and(differs) {
+            told = Some(outcome);
+        }
+    }
+    let outcome = told.ok_or_else(|| format!("{}: has no column t_s; --watch needs the time of each row", given.real.name))?;
+    write(&outcome, out)?;
+    say!("{}", out.join("report.html").display());
+    Ok(status(outcome.report.status))
 }
 
 /// A recording of any format as a table in memory. Tidy CSV is read strictly but for empty cells, which are rows to leave out;

@@ -12,16 +12,16 @@ pub(crate) fn run(files: &[PathBuf], json: bool) -> Result<ExitCode, String> {
     for file in files {
         match one(file) {
             Ok(description) if json => described.push(description),
-            Ok(description) => println!("{description}"),
+            Ok(description) => say!("{description}"),
             Err(message) => failed.push(message),
         }
     }
     if json {
         let text = serde_json::to_string_pretty(&described).map_err(|error| format!("info: cannot be written as JSON: {error}"))?;
-        println!("{text}");
+        say!("{text}");
     }
     for message in &failed {
-        eprintln!("ravenpose: {message}");
+        complain!("ravenpose: {message}");
     }
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) })
 }

@@ -1,11 +1,15 @@
 //! `ravenpose`: the command line for everything but the real-time service.
 
+#![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic where the reader has gone: say! and complain! do not")]
+
+#[macro_use]
+mod output;
+
 mod check;
 mod convert;
 mod gap;
 mod infer;
 mod info;
-mod output;
 mod pair;
 mod plot;
 mod progress;
@@ -103,6 +107,9 @@ enum Command {
         /// Say on standard error what the search tries
         #[arg(long)]
         trace: bool,
+        /// Go through one recording as it came, a minute at a time, and say when the robot no longer is its model
+        #[arg(long)]
+        watch: bool,
     },
     /// Concealed-truth trials of `gap`: recordings with sealed causes, answers, score; stopped, it goes on where it was
     Prove {
@@ -197,8 +204,8 @@ fn main() -> ExitCode {
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
         Command::Pair { run, truth, out, same } => pair::run(&run, truth.as_deref(), &out, same),
-        Command::Gap { real, sim, robot, out, seed, trace } => {
-            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace })
+        Command::Gap { real, sim, robot, out, seed, trace, watch } => {
+            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch })
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds } => record::run(&out, seconds),
@@ -222,7 +229,7 @@ fn main() -> ExitCode {
     match done {
         Ok(code) => code,
         Err(message) => {
-            eprintln!("ravenpose: {message}");
+            complain!("ravenpose: {message}");
             ExitCode::from(2)
         }
     }

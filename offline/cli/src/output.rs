@@ -1,7 +1,8 @@
-//! Output files appear whole or not at all.
+//! Output files appear whole or not at all; what is said goes where somebody still listens.
 
+use std::fmt::Arguments;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes through `write` into a file beside `path`, then renames it; on any failure nothing is left.
@@ -20,4 +21,37 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
         let _ = fs::remove_file(&aside);
     }
     written
+}
+
+/// Says a line on standard output; see [`say`].
+macro_rules! say {
+    ($($told:tt)*) => {{
+        let _ = $crate::output::say(format_args!("{}\n", format_args!($($told)*)));
+    }};
+}
+
+/// Says a line on standard error; see [`complain`].
+macro_rules! complain {
+    ($($told:tt)*) => {
+        $crate::output::complain(format_args!("{}\n", format_args!($($told)*)));
+    };
+}
+
+/// Writes to standard output; false where nobody reads any more. A reader that has had enough (`| head`) is no error: the
+/// command does its work and ends with its usual status. Output that cannot be written for another reason (a full disk) is.
+pub(crate) fn say(told: Arguments) -> bool {
+    let mut out = std::io::stdout().lock();
+    match out.write_fmt(told).and_then(|()| out.flush()) {
+        Ok(()) => true,
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => false,
+        Err(error) => {
+            complain!("ravenpose: standard output cannot be written: {error}");
+            std::process::exit(2);
+        }
+    }
+}
+
+/// Writes to standard error; where that is gone there is nobody left to tell.
+pub(crate) fn complain(told: Arguments) {
+    let _ = std::io::stderr().lock().write_fmt(told);
 }

@@ -19,8 +19,8 @@ pub(crate) fn run(run: &Path, truth: Option<&Path>, out: &Path, same: bool) -> R
     output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
     let report = out.with_extension("report.json");
     output::whole(&report, |file| file.write_all(paired.report.to_json().as_bytes()).map_err(|error| error.to_string()))?;
-    print!("{}", paired.report);
-    println!("{}: {} pairs; {}: the report", out.display(), paired.pairs.len(), report.display());
+    output::say(format_args!("{}", paired.report));
+    say!("{}: {} pairs; {}: the report", out.display(), paired.pairs.len(), report.display());
     Ok(ExitCode::SUCCESS)
 }
 

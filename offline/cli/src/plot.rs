@@ -15,7 +15,7 @@ pub(crate) fn run(input: &Path, out: &Path) -> Result<ExitCode, String> {
     let page = if svg { plot::overview_svg(&recording, &options) } else { plot::overview(&recording, &options) };
     let page = page.map_err(|error| error.to_string())?;
     output::whole(out, |file| file.write_all(page.as_bytes()).map_err(|error| error.to_string()))?;
-    println!("{}: {} kB", out.display(), page.len() / 1000);
+    say!("{}: {} kB", out.display(), page.len() / 1000);
     Ok(ExitCode::SUCCESS)
 }
 

@@ -32,7 +32,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let out = wish.out.as_os_str();
     let given = ["--matrix", wish.matrix, "--seed", &seed, "--jobs", &jobs, "--out"].map(OsStr::new);
     call(&generate, given.into_iter().chain([out]))?;
-    println!("hash of the sealed truths, before any answer: {}", sha256(&read(&wish.out.join("manifest.json"))?));
+    say!("hash of the sealed truths, before any answer: {}", sha256(&read(&wish.out.join("manifest.json"))?));
     call(&score, [OsStr::new("run"), out, OsStr::new("--tool"), own.as_os_str(), OsStr::new("--jobs"), OsStr::new(&jobs)])?;
     call(&score, [out])?;
 
@@ -41,7 +41,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let value: Value = serde_json::from_slice(&text).map_err(|error| format!("{}: {error}", scored.display()))?;
     let targets = value["targets"].as_array().map_or(&[][..], Vec::as_slice);
     let missed = targets.iter().filter(|target| target["met"] != true).count();
-    println!("{} of {} targets met; {}", targets.len() - missed, targets.len(), wish.out.join("score.html").display());
+    say!("{} of {} targets met; {}", targets.len() - missed, targets.len(), wish.out.join("score.html").display());
     Ok(if missed == 0 { ExitCode::SUCCESS } else { ExitCode::from(MISSED) })
 }
 

@@ -90,7 +90,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
     let poses = log.add_channel("/ravenpose/pose", &POSE).map_err(|error| error.to_string())?;
     let (sender, receiver) = sync_channel(WAITING_MAX);
     let stop = AtomicBool::new(false);
-    println!("recording to {}; Ctrl-C ends it", log.part().display());
+    say!("recording to {}; Ctrl-C ends it", log.part().display());
     let begun = Instant::now();
     let (tally, written) = std::thread::scope(|scope| {
         let listening = scope.spawn({
@@ -113,7 +113,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
     let (Ok(tally), Ok(written)) = (tally, written) else { return Err("a thread of the recorder failed".to_owned()) };
     written?;
     let tally = tally?;
-    println!(
+    say!(
         "{}: {} states, {} poses in {:.1} s; missed by the recorder: {} states, {} poses",
         out.display(),
         tally.states,
@@ -128,7 +128,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
 fn listen(sender: &SyncSender<Heard>, stop: &AtomicBool) -> Result<Tally, String> {
     // Without the right it listens all the same; 64 ms of patience are usually enough.
     if let Err(missing) = realtime::set_fifo(PRIORITY) {
-        println!("note: no real-time priority for the recorder ({missing}); messages may be missed on a busy machine");
+        say!("note: no real-time priority for the recorder ({missing}); messages may be missed on a busy machine");
     }
     let settings = Settings::from_env();
     let states = Reader::<RavenState>::open(&settings, DEPTH).map_err(|error| error.to_string())?;

@@ -19,11 +19,13 @@ pub(crate) fn run(runtime_dir: &Path, watch: bool, hgrm: Option<&Path>) -> Resul
         let stats = read(&path)?;
         if watch {
             // Home, draw, clear what is below: no flicker.
-            print!("\x1b[H{}\x1b[J", table(&stats).replace('\n', "\x1b[K\n"));
-            let _ = std::io::Write::flush(&mut std::io::stdout());
+            let shown = table(&stats).replace('\n', "\x1b[K\n");
+            if !output::say(format_args!("\x1b[H{shown}\x1b[J")) {
+                return Ok(ExitCode::SUCCESS);
+            }
             std::thread::sleep(Duration::from_secs(1));
         } else {
-            print!("{}", table(&stats));
+            output::say(format_args!("{}", table(&stats)));
             return Ok(ExitCode::SUCCESS);
         }
     }

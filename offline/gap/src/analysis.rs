@@ -1,8 +1,9 @@
 //! From runs to a report: prepare, learn, search, judge on what was held out, put into words.
 
+use std::io::Write as _;
 use std::time::Instant;
 
-use gap_report::{DataQuality, Fit, Level, Pictures, Report, Status};
+use gap_report::{DataQuality, Fit, Level, Pictures, Report, Space, Status};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
@@ -11,11 +12,11 @@ use crate::hypothesis::Dictionary;
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
-use crate::problem::{Pair, Problem};
+use crate::problem::{Cell, Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
-use crate::{builtin, corrected, flexible, verdicts};
+use crate::{builtin, closed_loop, corrected, flexible, known, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -72,6 +73,10 @@ pub struct Outcome {
     pub pictures: Pictures,
     /// Text of corrected.toml; none where nothing was found.
     pub corrected: Option<String>,
+    /// Effects that are not in corrected.toml, each with the reason.
+    pub left_out: Vec<String>,
+    /// Mean logarithm of what is left of the residuals of held-out runs; NaN where nothing was judged.
+    pub(crate) left: f64,
 }
 
 /// What the search and the judgement have in common; for the parts that put it into words.
@@ -128,7 +133,7 @@ const REACH: f64 = 0.6;
 /// Runs the whole analysis.
 ///
 /// Where no simulation is given, the robot's own numbers are taken at their word first. If something is left that they and the
-/// library do not explain, they are believed but roughly: a lab's numbers of a real robot are.
+/// library do not explain, they are believed but roughly, if that leaves less: a lab's numbers of a real robot are.
 ///
 /// # Errors
 /// [`AnalysisError`] where there is nothing to compare; everything else ends in a report.
@@ -140,19 +145,22 @@ pub fn analyse(
 ) -> Result<Outcome, AnalysisError> {
     let simulated: Vec<_> =
         given.iter().map(|one| if one.sim.is_some() { None } else { builtin::simulated(model, &one.real) }).collect();
-    let at_its_word = analyse_with(model, given, options, &simulated, progress)?;
+    let at_its_word = analyse_with(model, given, options, (&simulated, true), progress)?;
     let stands_in = simulated.iter().any(Option::is_some);
     if !stands_in || reaches_floor(&at_its_word.report) {
         return Ok(at_its_word);
     }
     progress("the robot's numbers, believed roughly");
-    let roughly = analyse_with(model, given, options, &[], progress)?;
+    // The numbers are taken roughly, but the model's own effects are there.
+    let along = |one: &Given| builtin::along_motion(model, &one.real).ok();
+    let effects: Vec<_> = if model.effects().is_empty() { Vec::new() } else { given.iter().map(along).collect() };
+    let roughly = analyse_with(model, given, options, (&effects, false), progress)?;
     let unexplained = |outcome: &Outcome| match outcome.report.status {
         Status::NoMismatch | Status::Explained | Status::InsufficientData => 0,
         Status::PartlyExplained => 1,
         Status::Unmodelled => 2,
     };
-    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1);
+    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1) && roughly.left < at_its_word.left;
     Ok(if better { roughly } else { at_its_word })
 }
 
@@ -164,7 +172,9 @@ fn reaches_floor(report: &Report) -> bool {
     };
     match report.status {
         Status::NoMismatch | Status::InsufficientData => true,
-        Status::Explained => report.verdicts.iter().flat_map(|v| &v.fit).all(reached),
+        Status::Explained => {
+            report.verdicts.iter().flat_map(|v| &v.fit).filter(|fit| fit.space == Space::EquationError).all(reached)
+        }
         Status::PartlyExplained | Status::Unmodelled => false,
     }
 }
@@ -173,7 +183,7 @@ fn analyse_with(
     model: &RobotModel,
     given: &[Given],
     options: &Options,
-    simulated: &[Option<Recording>],
+    (simulated, at_its_word): (&[Option<Recording>], bool),
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
     let begun = Instant::now();
@@ -257,10 +267,11 @@ fn analyse_with(
     progress("learning what the simulator believes");
     let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
     sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
-    let nominal = if sims.is_empty() { Nominal::of(&robot) } else { Nominal::learn_with(&robot, &sims, from_recording) };
+    let nominal =
+        if sims.is_empty() || !at_its_word { Nominal::of(&robot) } else { Nominal::learn_with(&robot, &sims, from_recording) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
     let problem = Problem::new(&robot, &nominal, &train, BLOCK_S.max(train_s / BLOCKS));
-    let prior = match (sims.is_empty(), from_recording) {
+    let prior = match (sims.is_empty() || !at_its_word, from_recording) {
         (true, _) => Prior::Believed,
         (false, true) => Prior::Drifting,
         (false, false) => Prior::Exact,
@@ -277,8 +288,20 @@ fn analyse_with(
     let thresholds = Thresholds { effects: if points { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
     let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
         if options.trace {
-            eprintln!("{line}");
+            // Nobody may listen any more.
+            let _ = writeln!(std::io::stderr(), "{line}");
         }
+    });
+    // What the forms of the model's own effects get wrong is no further effect.
+    let least = known::least(model, &problem, given, band);
+    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
+    answer.effects.retain(|effect| {
+        let size = |c: usize| effect.chosen.candidate.rms(c, &effect.chosen.coefficients);
+        let main = (0..floors.len()).max_by(|a, b| {
+            let height = |c: usize| size(c) / floors[c].max(1e-300);
+            height(*a).total_cmp(&height(*b))
+        });
+        main.is_none_or(|c| size(c) >= least[c])
     });
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
@@ -286,6 +309,7 @@ fn analyse_with(
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
+        && ceiling.cell.is_none_or(|(c, _)| left_of(&problem.cells[c], c, &answer, &estimates) >= least[c])
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
@@ -293,7 +317,6 @@ fn analyse_with(
     let held_problem = prior.put_on(held_problem);
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
-    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
     let found = Found {
         robot: &robot,
         nominal: &nominal,
@@ -315,7 +338,23 @@ fn analyse_with(
         .iter()
         .any(Effect::is_named)
         .then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
-    let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected);
+    progress("the corrected model, simulated");
+    let judged_s = begun.elapsed().as_secs_f64();
+    let again = match &corrected {
+        Some(models) => closed_loop::again((&models.before, &models.after), &found, given, band),
+        None => closed_loop::Again::default(),
+    };
+    let simulate_s = begun.elapsed().as_secs_f64() - judged_s;
+    quality.extend(again.told.iter().cloned());
+    let left_out = corrected.as_ref().map_or(&[][..], |models| &models.left_out);
+    quality.extend(left_out.iter().map(|why| DataQuality::new("corrected_model", Level::Warn, format!("not in it: {why}"))));
+    let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected, &again.fits);
+    outcome.report.timing.simulate_s = Some(simulate_s);
+    let left: Vec<f64> = (0..problem.cells.len())
+        .filter_map(|c| verdicts::held_out(&found, c))
+        .map(|(_, _, after)| crate::nominal::rms(after.into_iter()).max(1e-300).ln())
+        .collect();
+    outcome.left = crate::nominal::mean(&left);
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
@@ -357,6 +396,15 @@ fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceil
     let Some((c, _)) = ceiling.cell else { return true };
     let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
     !problem.from_recording || within.sqrt() > problem.practical[c]
+}
+
+/// RMS of what the effects leave of a residual.
+fn left_of(cell: &Cell, c: usize, answer: &Answer, estimates: &[Estimate]) -> f64 {
+    let mut left = cell.residual.clone();
+    for (effect, estimate) in answer.effects.iter().zip(estimates) {
+        left.iter_mut().zip(effect.chosen.candidate.effect(c, &estimate.coefficients)).for_each(|(y, p)| *y -= p);
+    }
+    crate::nominal::rms(left.into_iter())
 }
 
 fn too_short(seconds: f64) -> DataQuality {

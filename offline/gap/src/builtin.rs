@@ -3,7 +3,7 @@
 use recordings::Recording;
 use simulator::model::RobotModel;
 use simulator::plant::Given;
-use simulator::resimulate::{ClosedLoop, Motion, ResimulateError, Run, closed_loop, inverse};
+use simulator::resimulate::{ClosedLoop, Motion, OpenLoop, ResimulateError, Run, Simulated, closed_loop, inverse, open_loop};
 
 /// Half width of the window in which the recorded motion is differentiated, s.
 const REACH_S: f64 = 0.012;
@@ -11,18 +11,55 @@ const REACH_S: f64 = 0.012;
 /// The run of the model: its controller along the recorded commands where both are known, else the torque that the model asks
 /// for the recorded motion. None where the recording has neither.
 pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording> {
+    let run = run(model, recording).ok()?;
+    let played = if model.controller().is_some() { closed_loop(model, &run, ClosedLoop::default()) } else { given(model, &run) };
+    let simulated = played.or_else(|_| given(model, &run)).ok()?;
+    Some(named(model, recording, &simulated))
+}
+
+/// The model's controller along the recorded commands.
+///
+/// # Errors
+/// What keeps it from being simulated, in one line.
+pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
+    let played = run(model, recording).and_then(|run| closed_loop(model, &run, ClosedLoop::default()));
+    played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
+}
+
+/// The model driven by the recorded torque, started anew from the recorded state after every `window_s`.
+///
+/// # Errors
+/// What keeps it from being simulated, in one line.
+pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64) -> Result<Recording, String> {
+    let options = OpenLoop { window_s, ..OpenLoop::default() };
+    let played = run(model, recording).and_then(|run| open_loop(model, &run, options));
+    played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
+}
+
+/// The torque that the model asks for the recorded motion, and where its joints and its tip then are.
+///
+/// # Errors
+/// What keeps it from being simulated, in one line.
+pub fn along_motion(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
+    let played = run(model, recording).and_then(|run| given(model, &run));
+    played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
+}
+
+/// The recording as a run, its empty cells bridged.
+fn run(model: &RobotModel, recording: &Recording) -> Result<Run, ResimulateError> {
     let mut recording = recording.clone();
     for column in &mut recording.columns {
         // A simulation of an empty cell is empty from there on.
         let _ = crate::run::bridged(&mut column.values, 1.0, f64::INFINITY);
     }
-    let run = Run::from_recording(&recording, model).ok()?;
-    let played = if model.controller().is_some() { closed_loop(model, &run, ClosedLoop::default()) } else { given(model, &run) };
-    let simulated = played.or_else(|_| given(model, &run)).ok()?;
-    Some(simulated.to_recording(&format!("{} simulated by {}", recording.name, model.name()), model))
+    Run::from_recording(&recording, model)
 }
 
-fn given(model: &RobotModel, run: &Run) -> Result<simulator::resimulate::Simulated, ResimulateError> {
+fn named(model: &RobotModel, recording: &Recording, simulated: &Simulated) -> Recording {
+    simulated.to_recording(&format!("{} simulated by {}", recording.name, model.name()), model)
+}
+
+fn given(model: &RobotModel, run: &Run) -> Result<Simulated, ResimulateError> {
     let half_width = ((REACH_S / run.period_s()).round() as usize).max(2);
     inverse(model, &Motion::of_run(run, Given::Motors, half_width)?)
 }

@@ -1,25 +1,108 @@
 //! The robot model with what was missing.
 
 use simulator::model::{Bound, Connection, Effect, RobotModel};
-use simulator::physics::{Channel as DelayChannel, Parameters, Physics, Value};
+use simulator::physics::{
+    Backlash, CableStretch, Channel as DelayChannel, CoulombFriction, JointCoupling, JointOffset, MotorTorqueScale, Parameters,
+    Payload, Physics, Value, ViscousFriction,
+};
 
 use crate::analysis::Found;
 use crate::hypothesis::{Candidate, normals};
 use crate::intervals::Estimate;
 
-/// Text of corrected.toml: the given model, what the simulator was learnt to believe, and the effects that were found.
-pub(crate) fn model(given: &RobotModel, found: &Found, learnt: bool) -> String {
-    let mut model = given.clone();
-    if learnt {
-        believe(&mut model, found);
+/// What is believed of the robot, with and without what was missing.
+pub(crate) struct Corrected {
+    /// The given model, and what the simulator was learnt to believe.
+    pub(crate) before: RobotModel,
+    /// The same with the effects that were found.
+    pub(crate) after: RobotModel,
+    /// Effects that no simulator can be given, each with the reason.
+    pub(crate) left_out: Vec<String>,
+}
+
+impl Corrected {
+    /// Text of corrected.toml; what is not in it stands in its first lines.
+    pub(crate) fn to_toml(&self) -> String {
+        let told: Vec<String> = self.left_out.iter().map(|why| format!("# Not in this model: {why}.\n")).collect();
+        told.concat() + &self.after.to_toml()
     }
+}
+
+/// The given model with what was missing.
+pub(crate) fn model(given: &RobotModel, found: &Found, learnt: bool) -> Corrected {
+    let mut before = given.clone();
+    if learnt {
+        believe(&mut before, found);
+    }
+    let mut after = before.clone();
+    let mut left_out = Vec::new();
     for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
-        if let Some(effect) = as_effect(found, &effect.chosen.candidate, estimate) {
-            model.effects_mut().push(effect);
+        let candidate = &effect.chosen.candidate;
+        let put = as_effect(found, candidate, estimate).and_then(|(effect, sign)| {
+            let mut with = after.clone();
+            if !merged(&mut with, &effect, sign) {
+                if sign < 0.0 {
+                    return Err("there is less of it than none".to_owned());
+                }
+                with.effects_mut().push(effect);
+            }
+            // A file that could not be read again would be worse than one without the effect.
+            with.plant().map_err(|error| error.to_string())?;
+            RobotModel::from_toml(&with.to_toml(), None).map_err(|error| error.to_string())?;
+            Ok(with)
+        });
+        match put {
+            Ok(with) => after = with,
+            Err(why) => left_out.push(format!("{}: {why}", named(found, candidate))),
         }
     }
-    model.set_name(&format!("{} corrected", given.name()));
-    model.to_toml()
+    after.set_name(&format!("{} corrected", given.name()));
+    Corrected { before, after, left_out }
+}
+
+/// Puts more (or less: a sign of -1) of what the model has already into the effect that it has; false where it has none, or the two do not
+/// add up to one of their kind.
+fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
+    let always = |effect: &Effect| effect.from_s == f64::NEG_INFINITY && effect.to_s == f64::INFINITY;
+    let same = |effect: &&mut Effect| {
+        effect.physics.name() == more.physics.name() && effect.bound == more.bound && always(effect) && always(more)
+    };
+    let Some(own) = model.effects_mut().iter_mut().find(same) else { return false };
+    let both = match (own.physics, more.physics) {
+        (Physics::CoulombFriction(a), Physics::CoulombFriction(b)) if a.asymmetry == 0.0 && b.asymmetry == 0.0 => {
+            Physics::CoulombFriction(CoulombFriction { f_c: a.f_c + sign * b.f_c, ..a })
+        }
+        (Physics::ViscousFriction(a), Physics::ViscousFriction(b)) => {
+            Physics::ViscousFriction(ViscousFriction { b: a.b + sign * b.b })
+        }
+        (Physics::Backlash(a), Physics::Backlash(b)) => Physics::Backlash(Backlash { b: a.b + sign * b.b }),
+        (Physics::CableStretch(a), Physics::CableStretch(b)) => {
+            // In series: compliances add up.
+            Physics::CableStretch(CableStretch { k: 1.0 / (1.0 / a.k + sign / b.k), ..a })
+        }
+        (Physics::JointCoupling(a), Physics::JointCoupling(b)) => Physics::JointCoupling(JointCoupling { c_ij: a.c_ij + b.c_ij }),
+        (Physics::JointOffset(a), Physics::JointOffset(b)) => Physics::JointOffset(JointOffset { o: a.o + b.o }),
+        (Physics::MotorTorqueScale(a), Physics::MotorTorqueScale(b)) if a.d_0 == 0.0 && b.d_0 == 0.0 => {
+            Physics::MotorTorqueScale(MotorTorqueScale { kappa: a.kappa * b.kappa, ..a })
+        }
+        (Physics::Payload(a), Physics::Payload(b)) => {
+            let mass_kg = a.mass_kg + sign * b.mass_kg;
+            let moment = |k: usize| a.mass_kg * a.centre_m[k] + sign * b.mass_kg * b.centre_m[k];
+            Physics::Payload(Payload { mass_kg, centre_m: std::array::from_fn(|k| moment(k) / mass_kg) })
+        }
+        _ => return false,
+    };
+    // What is below nothing is not one of its kind: the caller is told when it is read again.
+    own.physics = both;
+    own.source.clone_from(&more.source);
+    true
+}
+
+/// An effect and where it is, in words.
+fn named(found: &Found, candidate: &Candidate) -> String {
+    let places = crate::verdicts::joints(found.robot, candidate);
+    let at = if places.is_empty() { String::new() } else { format!(" of {}", places.join(" and ")) };
+    format!("{}{at}", candidate.family.physics.replace('_', " "))
 }
 
 /// Drives as learnt from the simulator's output; links stay as the lab has them.
@@ -46,67 +129,102 @@ fn believe(model: &mut RobotModel, found: &Found) {
     }
 }
 
-/// One effect for the simulator; none where it has no such term.
-fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Option<Effect> {
+/// One effect for the simulator, and -1 where it is to be taken off; the reason where it has no such term.
+fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Result<(Effect, f64), String> {
     let family = &candidate.family;
     let joint = family.joints.first().copied();
     let numbers: Vec<(&str, f64)> = estimate.parameters.iter().map(|(named, _)| (named.name, named.value)).collect();
     let mut parameters = Parameters::of(&numbers);
-    let bound = match family.physics {
-        "payload" if candidate.shape_of("link").is_some_and(|link| link as usize + 1 < found.robot.joint_count()) => {
+    let at_joint = || joint.map(Bound::Joint).ok_or_else(|| "it has no joint".to_owned());
+    let mut name = family.physics;
+    let bound = match (family.physics, family.form) {
+        ("payload", _) if candidate.shape_of("link").is_some_and(|link| link as usize + 1 < found.robot.joint_count()) => {
             // A weight on another link than the last one: what it adds to that link.
             let place = nalgebra::Vector3::from(["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(0.0)));
             let added = arm::serial::LinkInertia::point(estimate.coefficients[0], place).parameters();
-            parameters = Parameters::of(&[]);
-            let _ = parameters.0.insert("dpi_B".to_owned(), Value::Vector(added.to_vec()));
-            let link = candidate.shape_of("link")? as usize;
-            return Physics::new("link_inertia", &parameters)?.ok().map(|physics| Effect {
-                source: Some(format!("ravenpose gap (payload {})", family.form)),
-                ..Effect::new(physics, Bound::Link(link))
-            });
+            parameters = vector("dpi_B", added.to_vec());
+            name = "link_inertia";
+            Bound::Link(candidate.shape_of("link").unwrap_or(0.0) as usize)
         }
-        "joint_coupling" => Bound::Pair(family.joints[0], family.joints[1]),
-        "link_inertia" => {
-            let change = link_change(found, candidate, &estimate.coefficients)?;
-            parameters = Parameters::of(&[]);
-            let _ = parameters.0.insert("dpi_B".to_owned(), Value::Vector(change));
-            Bound::Link(joint?)
+        ("joint_coupling", _) => Bound::Pair(family.joints[0], family.joints[1]),
+        ("link_inertia", _) => {
+            parameters = vector("dpi_B", link_change(found, candidate, &estimate.coefficients)?);
+            joint.map(Bound::Link).ok_or("it has no link")?
         }
-        "link_geometry" => Bound::Link(if family.form == "length" { joint? + 1 } else { joint? }),
-        "measurement_delay" => Bound::Channel(match family.form {
+        ("link_geometry", form) => {
+            let link = joint.ok_or("it has no link")?;
+            Bound::Link(if form == "length" { link + 1 } else { link })
+        }
+        ("measurement_delay", form) => Bound::Channel(match form {
             "joint encoders" => DelayChannel::Transmission,
-            "torque" => return None,
+            "torque" => return Err("the simulator has no late torque".to_owned()),
             _ => DelayChannel::EndEffector,
         }),
-        "payload" | "gravity_direction" | "frame_misalignment" => Bound::Robot,
-        "external_contact" => {
-            let normal = normals().get(candidate.shape_of("normal")? as usize).copied()?;
+        ("payload" | "gravity_direction" | "frame_misalignment", _) => Bound::Robot,
+        ("external_contact", _) => {
+            let normal = candidate.shape_of("normal").and_then(|k| normals().get(k as usize).copied());
+            let normal = normal.ok_or("a force without a wall is not a term of the simulator")?;
             let _ = parameters.0.insert("n".to_owned(), Value::Vector(normal.as_slice().to_vec()));
             Bound::Robot
         }
-        "load_dependent_friction" => {
+        ("load_dependent_friction", _) => {
             let _ = parameters.0.remove("mu_theta");
-            Bound::Joint(joint?)
+            at_joint()?
         }
-        _ => Bound::Joint(joint?),
+        ("motor_torque_scale", form) if form != "scale" && !parameters.0.contains_key("d_0") => {
+            return Err("its offset is in counts of the amplifier, and the robot's file has no torque_constant_nm_a and \
+                        counts_per_a of the drive"
+                .to_owned());
+        }
+        ("cable_hysteresis", "play of many widths") => {
+            return Err("play of many widths, of a joint without known load, is not a term of the simulator".to_owned());
+        }
+        _ => at_joint()?,
     };
-    if family.physics == "measurement_delay" {
-        // A simulator cannot look ahead.
-        parameters.0.retain(|_, value| matches!(value, Value::Number(x) if *x >= 0.0));
+    if family.physics == "measurement_delay" && parameters.0.values().any(|value| matches!(value, Value::Number(age) if *age < 0.0))
+    {
+        return Err("a simulator cannot look ahead".to_owned());
     }
-    let physics = Physics::new(family.physics, &parameters)?.ok()?;
+    let sign = less(name, &mut parameters);
+    let physics = Physics::new(name, &parameters).ok_or("the simulator does not know it")?.map_err(|error| error.to_string())?;
     let mut effect = Effect::new(physics, bound);
     if let Some([from, to]) = estimate.window {
         effect.from_s = from.map_or(f64::NEG_INFINITY, |(t, _)| t);
         effect.to_s = to.map_or(f64::INFINITY, |(t, _)| t);
     }
-    effect.source = Some(format!("ravenpose gap ({})", family.form));
-    Some(effect)
+    let told = if name == family.physics { family.form.to_owned() } else { format!("{} {}", family.physics, family.form) };
+    effect.source = Some(format!("ravenpose gap ({told})"));
+    Ok((effect, sign))
+}
+
+/// Sizes that cannot be negative, of what the model may hold too much of.
+const SIZES: [(&str, &str); 5] =
+    [("coulomb_friction", "f_c"), ("viscous_friction", "b"), ("backlash", "b"), ("cable_stretch", "k"), ("payload", "m_p")];
+
+/// -1 where there is less than the model holds; the parameter is then how much less.
+fn less(physics: &str, parameters: &mut Parameters) -> f64 {
+    let size = SIZES.iter().find(|(name, _)| *name == physics).map(|(_, parameter)| *parameter);
+    match size.and_then(|name| parameters.0.get_mut(name)) {
+        Some(Value::Number(size)) if *size < 0.0 => {
+            *size = -*size;
+            -1.0
+        }
+        _ => 1.0,
+    }
+}
+
+fn vector(name: &str, values: Vec<f64>) -> Parameters {
+    let mut parameters = Parameters::of(&[]);
+    let _ = parameters.0.insert(name.to_owned(), Value::Vector(values));
+    parameters
 }
 
 /// Change of the ten parameters of a link.
-fn link_change(found: &Found, candidate: &Candidate, theta: &[f64]) -> Option<Vec<f64>> {
-    let link = *candidate.family.joints.first()?;
+fn link_change(found: &Found, candidate: &Candidate, theta: &[f64]) -> Result<Vec<f64>, String> {
+    let link = *candidate.family.joints.first().ok_or("it has no link")?;
     let own = found.robot.arm.link_inertia(link).parameters();
-    (candidate.family.form == "scaled").then(|| own.iter().map(|x| x * theta[0]).collect())
+    match (candidate.family.form, theta) {
+        ("scaled", [share, ..]) => Ok(own.iter().map(|x| x * share).collect()),
+        _ => Err("its parameters are known in the combinations that the motion shows, not one by one".to_owned()),
+    }
 }

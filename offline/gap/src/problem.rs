@@ -35,7 +35,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    fn new(channel: Channel, index: usize) -> Self {
+    /// Without rows.
+    pub(crate) fn new(channel: Channel, index: usize) -> Self {
         Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new() }
     }
 

@@ -69,6 +69,8 @@ pub struct Robot {
     pub columns: Vec<(String, String, f64)>,
     /// Candidate places of a payload beside the last link.
     pub payload_sites: Vec<PayloadSite>,
+    /// Physics and joints of the effects that its model holds already: of those there may be less, too.
+    pub known: Vec<(String, Vec<usize>)>,
 }
 
 impl Robot {
@@ -112,6 +114,7 @@ impl Robot {
             drives: drives.collect(),
             columns: model.columns.iter().map(|c| (c.name.clone(), c.source.clone(), c.scale)).collect(),
             payload_sites: sites.collect(),
+            known: crate::known::effects(model),
             motor_from_joint,
             arm,
         }

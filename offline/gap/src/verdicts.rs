@@ -5,12 +5,13 @@ use std::time::{Instant, SystemTime};
 use gap_report::{
     Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature,
     Fit as FitFigure, FloorMethod, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures,
-    Regime, Remaining, Report, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing,
-    Tool, Verdict, ranked, timestamp,
+    Regime, Remaining, Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod,
+    Timing, Tool, Verdict, ranked, timestamp,
 };
 
 use crate::analysis::{Found, Given, Options, Outcome};
 use crate::controller::Changed;
+use crate::corrected::Corrected;
 use crate::hypothesis::{Candidate, UNMODELLED};
 use crate::intervals::Estimate;
 use crate::nominal::rms;
@@ -95,7 +96,7 @@ pub(crate) fn insufficient(
     report.status = Status::InsufficientData;
     report.timing.total_s = begun.elapsed().as_secs_f64();
     report.summary = gap_report::headlines(&report).join(" ");
-    Outcome { report, pictures: Pictures::default(), corrected: None }
+    Outcome { report, pictures: Pictures::default(), corrected: None, left_out: Vec::new(), left: f64::NAN }
 }
 
 /// The whole report.
@@ -105,7 +106,8 @@ pub(crate) fn outcome(
     given: &[Given],
     options: &Options,
     data_quality: Vec<DataQuality>,
-    corrected: Option<String>,
+    corrected: Option<Corrected>,
+    again: &[Vec<FitFigure>],
 ) -> Outcome {
     let robot = found.robot;
     let mut report = bare(robot, runs, given, options, data_quality);
@@ -116,14 +118,20 @@ pub(crate) fn outcome(
         all.dedup();
         all
     };
-    let artifact = corrected.as_ref().map(|text| Artifact::new("corrected.toml", Format::Toml).sha256(sha256(text.as_bytes())));
+    let text = corrected.as_ref().map(Corrected::to_toml);
+    let artifact = text.as_ref().map(|text| Artifact::new("corrected.toml", Format::Toml).sha256(sha256(text.as_bytes())));
     report.inputs.channels.clone_from(&channels);
     let mut verdicts = Vec::new();
     for (k, (effect, estimate)) in effects.iter().zip(found.estimates).enumerate() {
-        if let Some(artifact) = artifact.clone().filter(|_| effect.is_named()) {
-            verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact));
-        } else {
+        let Some(artifact) = artifact.clone().filter(|_| effect.is_named()) else {
             verdicts.push(unnamed(found, k, effect, estimate));
+            continue;
+        };
+        verdicts.extend(verdicts_of(found, k, effect, estimate, thresholds.nats, artifact));
+        if let (Some(primary), Some(again)) =
+            (verdicts.iter_mut().rev().find(|v: &&mut Verdict| v.role == Role::Primary), again.get(k))
+        {
+            primary.fit.extend(again.iter().cloned());
         }
     }
     let unnamed = found.controller.is_some() || effects.iter().any(|effect| !effect.is_named());
@@ -156,7 +164,13 @@ pub(crate) fn outcome(
     report.remaining = remaining(found);
     let failed = report.data_quality.iter().filter(|q| q.level == Level::Fail).map(gap_report::quality_headline);
     report.summary = failed.chain(gap_report::headlines(&report)).collect::<Vec<_>>().join(" ");
-    Outcome { report, pictures: pictures::draw(found, runs), corrected }
+    Outcome {
+        report,
+        pictures: pictures::draw(found, runs),
+        corrected: text,
+        left_out: corrected.map_or_else(Vec::new, |models| models.left_out),
+        left: f64::NAN,
+    }
 }
 
 /// Everything but the answer.

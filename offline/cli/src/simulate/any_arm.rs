@@ -33,10 +33,10 @@ pub(super) fn run(wish: &Wish<'_>, model: &RobotModel) -> Result<ExitCode, Strin
         return Err(format!("--motion zigzag: is for RAVEN-II; {} has reaches as in teleoperation", model.name()));
     }
     for note in model.notes() {
-        println!("note: {note}");
+        say!("note: {note}");
     }
     if model.controller().is_none() {
-        println!("note: the robot's file has no [controller]; gains are assumed");
+        say!("note: the robot's file has no [controller]; gains are assumed");
     }
     if wish.commands.is_empty() { made(wish, model, format) } else { followed(wish, model, format) }
 }

@@ -52,7 +52,7 @@ fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, Pa
 fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<ExitCode, String> {
     crate::output::whole(summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
     let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
-    println!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
+    say!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
     Ok(ExitCode::SUCCESS)
 }
 

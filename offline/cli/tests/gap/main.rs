@@ -7,3 +7,4 @@ mod examples;
 mod gaps;
 mod made;
 mod refused;
+mod watch;

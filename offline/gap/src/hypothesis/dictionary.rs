@@ -194,6 +194,17 @@ impl<'a> Dictionary<'a> {
         self.deflection(&all)
     }
 
+    /// A deflection of one drive's cable: joints whose position is read through others' cables see their share.
+    pub fn strain_of(&self, drive: usize, series: Vec<f64>) -> Column {
+        let n = self.joints();
+        let shares = self.problem.robot.coupling().try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
+        let share = |joint: usize| shares[(joint, drive)];
+        let of = |joint: usize| (share(joint) != 0.0).then(|| series.iter().map(|x| share(joint) * x).collect());
+        let mut all: Vec<Option<Vec<f64>>> = (0..n).map(|joint| if joint == drive { None } else { of(joint) }).collect();
+        all[drive] = Some(series);
+        self.deflection(&all)
+    }
+
     /// A torque of one joint; not at the link: of its drive, which its cables carry to the joints that they pass.
     pub fn effort_of(&self, joint: usize, series: Vec<f64>, at_link: bool) -> Column {
         let mut all = vec![None; self.joints()];

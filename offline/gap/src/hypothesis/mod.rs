@@ -231,6 +231,12 @@ pub fn library(dictionary: &Dictionary) -> Vec<Arc<Family>> {
     timing::push(dictionary, &mut all);
     environment::push(dictionary, &mut all);
     unknown::push(dictionary, &mut all);
+    // Of what the model holds already the robot may have less.
+    for family in &mut all {
+        if dictionary.problem.robot.known.iter().any(|(physics, joints)| physics == family.physics && *joints == family.joints) {
+            family.bounds.iter_mut().filter(|bound| **bound == Bound::Positive).for_each(|bound| *bound = Bound::Free);
+        }
+    }
     all.into_iter().map(Arc::new).collect()
 }
 

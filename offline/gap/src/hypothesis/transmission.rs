@@ -51,7 +51,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         &[Bound::Between(0.7, 1.4)],
         &[("b", true)],
         product(&[&PLAY.map(|share| share * travel)]),
-        move |d, s| vec![d.deflection_of(j, lag(d, j, s[0]))],
+        move |d, s| vec![d.strain_of(j, lag(d, j, s[0]))],
     ));
     // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
     if size(&dictionary.load(j)) < 1e-9 {
@@ -65,7 +65,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             move |d| {
                 widths
                     .iter()
-                    .map(|width| d.deflection_of(j, lag(d, j, *width)))
+                    .map(|width| d.strain_of(j, lag(d, j, *width)))
                     .chain([d.deflection_of(j, minus(&position(d, j))), offset(d, j)])
                     .collect()
             },
@@ -82,7 +82,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &[Bound::Positive],
             &[("crossing", true)],
             product(&[&CROSSING.map(|share| share * usual)]),
-            move |d, s| vec![d.deflection_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
+            move |d, s| vec![d.strain_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
         )
         .penalised(1.5),
     );
@@ -109,7 +109,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         return;
     }
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
-        vec![d.deflection_of(j, d.load(j))]
+        vec![d.strain_of(j, d.load(j))]
     }));
     all.push(
         Family::shaped(
@@ -122,7 +122,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             product(&[&STRAIGHT, &YIELD.map(|share| share * usual), &[1.0, 2.0], &[0.01, 0.6]]),
             move |d, s| {
                 let load = d.load(j);
-                vec![d.deflection_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.deflection_of(j, load)]
+                vec![d.strain_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.strain_of(j, load)]
             },
         )
         .penalised(3.0),
@@ -137,7 +137,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                 &[Bound::Positive],
                 &[("T_k", true)],
                 product(&[&CREEP_S]),
-                move |d, s| vec![d.deflection_of(j, crept(d, j, s[0], settled))],
+                move |d, s| vec![d.strain_of(j, crept(d, j, s[0], settled))],
             )
             .penalised(1.0),
         );
@@ -151,7 +151,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &[Bound::Free],
             &[("T", true)],
             product(&[&super::friction::HEATING_S]),
-            move |d, s| vec![d.deflection_of(j, super::friction::heat(d, j, s[0]))],
+            move |d, s| vec![d.strain_of(j, super::friction::heat(d, j, s[0]))],
         )
         .penalised(3.0),
     );
@@ -337,7 +337,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
 fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let small = Bound::Between(-0.5, 0.5);
     for i in (0..dictionary.joints()).filter(|i| *i != j) {
-        let coupled = move |d: &Dictionary| d.deflection_of(j, position(d, i));
+        let coupled = move |d: &Dictionary| d.strain_of(j, position(d, i));
         let pair = [j, i];
         all.push(
             Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]).penalised(1.0),
@@ -354,7 +354,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let mut bounds = vec![small];
             bounds.resize(2 + widths.len(), Bound::Free);
             let family = Family::fixed("joint_coupling", &pair, "position, with play", TRANSMISSION, &bounds, move |d| {
-                let late = widths.iter().map(|width| d.deflection_of(j, lag(d, i, *width)));
+                let late = widths.iter().map(|width| d.strain_of(j, lag(d, i, *width)));
                 std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
             });
             all.push(family.penalised(4.0));
