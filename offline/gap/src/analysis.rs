@@ -127,6 +127,8 @@ const FLOOR: f64 = 2.0;
 const REMOVED: f64 = 0.95;
 /// Share of its torque that the model of a simulator leaves; real robots leave a tenth and more.
 const OF_A_MODEL: f64 = 0.05;
+/// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
+const ABOUT: f64 = 0.4;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
@@ -160,7 +162,7 @@ pub fn analyse(
         Status::PartlyExplained => 1,
         Status::Unmodelled => 2,
     };
-    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1) && roughly.left < at_its_word.left;
+    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1) && roughly.left < at_its_word.left + ABOUT;
     Ok(if better { roughly } else { at_its_word })
 }
 
