@@ -1,1 +1,20 @@
-//! x
+//! The true pose of the end effector from webcams and three coloured balls.
+//!
+//! [`rig`], [`table`] and [`picture`] read a scene; [`localise`] and [`bundle`] find out where the cameras stand;
+//! Lengths are metres inside, millimetres in files. How it works and what it reaches: `docs/vision.md`.
+#![deny(missing_docs)]
+
+pub mod bundle;
+pub mod camera;
+pub mod chessboard;
+pub mod colour;
+pub mod error;
+pub mod least_squares;
+pub mod localise;
+pub mod picture;
+pub mod plane_pose;
+pub mod rig;
+pub mod table;
+
+pub use camera::{Camera, Intrinsics};
+pub use error::{Error, Result};
