@@ -96,8 +96,9 @@ pub fn learn<'a>(names: &[String; 3], images: impl Iterator<Item = &'a RgbImage>
     for (hue, chroma) in pixels.iter().filter(|(_, chroma)| *chroma > grey) {
         histogram[(*hue as usize) % 360] += f64::from(*chroma);
     }
-    let smooth: Vec<f64> =
-        (0..360_i32).map(|k| (-8..=8).map(|d: i32| histogram[(k + d).rem_euclid(360) as usize] * f64::from(9 - d.abs())).sum()).collect();
+    let smooth: Vec<f64> = (0..360_i32)
+        .map(|k| (-8..=8).map(|d: i32| histogram[(k + d).rem_euclid(360) as usize] * f64::from(9 - d.abs())).sum())
+        .collect();
     let nominal: [f64; 3] = std::array::from_fn(|k| nominal_hue_deg(&names[k]).unwrap_or(0.0));
     let peaks = nominal.map(|hue| peak(&smooth, hue));
     std::array::from_fn(|k| {

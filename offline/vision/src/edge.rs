@@ -32,7 +32,8 @@ impl Cone {
     pub fn of_circle(intrinsics: &Intrinsics, centre: Point2<f64>, radius_px: f64) -> Self {
         let axis = intrinsics.direction(centre);
         // Off the axis of the camera the outline is longer than wide; the mean of both is what a circle fits.
-        let rim = |dx: f64, dy: f64| axis.angle(&intrinsics.direction(Point2::new(centre.x + dx * radius_px, centre.y + dy * radius_px)));
+        let rim =
+            |dx: f64, dy: f64| axis.angle(&intrinsics.direction(Point2::new(centre.x + dx * radius_px, centre.y + dy * radius_px)));
         Self { axis, opening_rad: 0.25 * (rim(1.0, 0.0) + rim(-1.0, 0.0) + rim(0.0, 1.0) + rim(0.0, -1.0)) }
     }
 

@@ -4,6 +4,7 @@
 use crate::colour::ColourRange;
 use image::{GrayImage, Luma, RgbImage};
 use imageproc::edges::canny;
+use imageproc::filter::gaussian_blur_f32;
 use nalgebra::Point2;
 
 /// A circle in an image.
@@ -49,7 +50,8 @@ pub fn mask(image: &RgbImage, window: Window, range: &ColourRange) -> GrayImage 
         for x in 0..w {
             let (left, right) = (x.saturating_sub(1), (x + 1).min(w - 1));
             for c in 0..3 {
-                lines[3 * (y * w + x) + c] = u16::from(row[3 * left + c]) + u16::from(row[3 * x + c]) + u16::from(row[3 * right + c]);
+                lines[3 * (y * w + x) + c] =
+                    u16::from(row[3 * left + c]) + u16::from(row[3 * x + c]) + u16::from(row[3 * right + c]);
             }
         }
     }
@@ -104,7 +106,8 @@ pub fn circles(image: &RgbImage, window: Window, range: &ColourRange, radius_px:
     // Where the count jumps over what is wanted, two maxima stand on one circle: a wider blur merges them.
     let mut found = Vec::new();
     for sigma in [1.4_f32, 2.0, 2.8] {
-        let edges = product(&canny(&imageproc::filter::gaussian_blur_f32(&grey, sigma - 0.4), 12.0, 30.0), &colour);
+        let smooth = gaussian_blur_f32(&grey, sigma - 0.4);
+        let edges = product(&canny(&smooth, 12.0, 30.0), &smooth, &colour);
         let (circles, exact) = vote(&edges, [window.width, window.height], radius_px, wanted, f64::from(sigma));
         found = circles;
         if exact {
@@ -119,7 +122,7 @@ pub fn circles(image: &RgbImage, window: Window, range: &ColourRange, radius_px:
 }
 
 /// Canny's edges at the border of the colour, each with the direction in which the colour lies.
-fn product(edges: &GrayImage, colour: &GrayImage) -> Vec<Edge> {
+fn product(edges: &GrayImage, smooth: &GrayImage, colour: &GrayImage) -> Vec<Edge> {
     let (w, h) = (edges.width() as i64, edges.height() as i64);
     let mut all = Vec::new();
     for (x, y, value) in edges.enumerate_pixels() {
@@ -140,10 +143,28 @@ fn product(edges: &GrayImage, colour: &GrayImage) -> Vec<Edge> {
         let length = sx.hypot(sy);
         // The border of a half plane: neither alone nor amidst the colour.
         if count >= 5 && count <= 42 && length > 12.0 {
-            all.push(Edge { x: x as f32, y: y as f32, inward: [sx / length, sy / length] });
+            // The gradient says the direction better than the mask does; the mask says which way is in.
+            let (gx, gy) = gradient(smooth, x, y);
+            let slope = gx.hypot(gy);
+            let along = (gx * sx + gy * sy) / (slope * length).max(1e-6);
+            if along.abs() > 0.7 {
+                let sign = along.signum() / slope;
+                all.push(Edge { x: x as f32, y: y as f32, inward: [gx * sign, gy * sign] });
+            }
         }
     }
     all
+}
+
+/// Sobel's gradient.
+fn gradient(image: &GrayImage, x: u32, y: u32) -> (f32, f32) {
+    let (w, h) = (i64::from(image.width()) - 1, i64::from(image.height()) - 1);
+    let v = |dx: i64, dy: i64| {
+        f32::from(image.get_pixel((i64::from(x) + dx).clamp(0, w) as u32, (i64::from(y) + dy).clamp(0, h) as u32).0[0])
+    };
+    let gx = v(1, -1) + 2.0 * v(1, 0) + v(1, 1) - v(-1, -1) - 2.0 * v(-1, 0) - v(-1, 1);
+    let gy = v(-1, 1) + 2.0 * v(0, 1) + v(1, 1) - v(-1, -1) - 2.0 * v(0, -1) - v(1, -1);
+    (gx, gy)
 }
 
 fn vote(edges: &[Edge], size: [u32; 2], radius_px: [f64; 2], wanted: usize, sigma: f64) -> (Vec<Circle>, bool) {
@@ -195,8 +216,7 @@ fn peaks(plane: &crate::picture::Plane, least_radius_px: f64) -> Vec<(f32, i64, 
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f32, i64, i64)> = Vec::new();
     for peak in all {
-        let apart =
-            |other: &(f32, i64, i64)| ((other.1 - peak.1) as f64).hypot((other.2 - peak.2) as f64) > 0.5 * least_radius_px;
+        let apart = |other: &(f32, i64, i64)| ((other.1 - peak.1) as f64).hypot((other.2 - peak.2) as f64) > 0.5 * least_radius_px;
         if kept.iter().all(apart) {
             kept.push(peak);
         }

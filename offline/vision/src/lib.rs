@@ -15,8 +15,12 @@ pub mod least_squares;
 pub mod localise;
 pub mod picture;
 pub mod plane_pose;
+pub mod pose;
 pub mod rig;
+pub mod simplex;
+pub mod sphere;
 pub mod table;
+pub mod triangulate;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::{Error, Result};
