@@ -1,6 +1,7 @@
 //! Pinhole camera with Brown-Conrady distortion (D. C. Brown, "Close-range camera calibration", 1971).
 //!
-//! World and camera frames in metres; camera z looks forward, x to the right, y down; pixel (0, 0) is the centre of the first pixel.
+//! World and camera frames in metres; camera z looks forward, x to the right, y down; pixels are counted from the image's
+//! upper left corner: the centre of the first one is (0.5, 0.5).
 
 use nalgebra::{Matrix2, Matrix2x3, Point2, Point3, Rotation3, Unit, Vector2, Vector3};
 
@@ -104,7 +105,7 @@ impl Camera {
 
     /// Is a pixel inside the image?
     pub fn sees(&self, pixel: Point2<f64>) -> bool {
-        (-0.5..f64::from(self.size_px[0]) - 0.5).contains(&pixel.x) && (-0.5..f64::from(self.size_px[1]) - 0.5).contains(&pixel.y)
+        (0.0..f64::from(self.size_px[0])).contains(&pixel.x) && (0.0..f64::from(self.size_px[1])).contains(&pixel.y)
     }
 
     /// Camera at a place that looks at another, its v axis as near to straight down as can be.

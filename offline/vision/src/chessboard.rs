@@ -57,7 +57,8 @@ pub fn find(grey: &Plane, inner_corners: [usize; 2]) -> Result<Corners, usize> {
         }
         if let Some(corners) = ordered(&grid, inner_corners) {
             let fine = grey.blurred(1.0);
-            let pixels = corners.iter().map(|corner| exact(&fine, *corner)).collect();
+            // From indices to the image's corner.
+            let pixels = corners.iter().map(|corner| exact(&fine, *corner) + Vector2::new(0.5, 0.5)).collect();
             return Ok(Corners { columns: inner_corners[0], rows: inner_corners[1], pixels });
         }
     }

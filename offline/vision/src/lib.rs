@@ -4,12 +4,14 @@
 //! Lengths are metres inside, millimetres in files. How it works and what it reaches: `docs/vision.md`.
 #![deny(missing_docs)]
 
+pub mod associate;
 pub mod bundle;
 pub mod camera;
 pub mod chessboard;
 pub mod colour;
 pub mod edge;
 pub mod error;
+pub mod frame;
 pub mod hough;
 pub mod least_squares;
 pub mod localise;
