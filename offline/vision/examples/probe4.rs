@@ -53,6 +53,8 @@ fn main() {
         let mut halos = vec![];
         let (mut sum, mut osum, mut n) = (0.0, 0.0, 0.0);
         let mut mean = nalgebra::Vector3::zeros();
+        let mut pool: Vec<(f64, f64)> = vec![];
+        let mut pool2: Vec<(f64, f64, f64, f64, usize, usize)> = vec![];
         let mut prev: Option<nalgebra::Isometry3<f64>> = None;
         for (f, row) in truth.iter().enumerate() {
             let images = load(f);
@@ -93,6 +95,60 @@ fn main() {
                                 .collect::<String>())
                             .collect::<Vec<_>>()
                     );
+                    {
+                        let (lo, hi) = (f.saturating_sub(1), (f + 1).min(truth.len() - 1));
+                        let (mut a, mut y) = (nalgebra::Matrix2::<f64>::zeros(), nalgebra::Vector2::zeros());
+                        let mut all = vec![];
+                        for b in 0..3 {
+                            for k in 0..4 {
+                                if let frame::View::Effective(g) = &m.views[b][k] {
+                                    let at = |q: usize| {
+                                        nalgebra::Point3::new(truth[q][9 + 3 * b], truth[q][10 + 3 * b], truth[q][11 + 3 * b])
+                                            / 1000.0
+                                    };
+                                    let v = (cal.cameras[k].project(&at(hi)).unwrap() - cal.cameras[k].project(&at(lo)).unwrap())
+                                        / (hi - lo) as f64;
+                                    for q in &g.points {
+                                        if q.width_px.is_finite() {
+                                            if (q.width_px / 0.8416).powi(2) < 5.0 {
+                                                pool2.push((
+                                                    v.dot(&q.normal).powi(2),
+                                                    (q.width_px / 0.8416).powi(2),
+                                                    q.normal.x,
+                                                    q.normal.y,
+                                                    4 * b + k,
+                                                    f,
+                                                ));
+                                            }
+                                            all.push((v.dot(&q.normal).powi(2), (q.width_px / 0.8416).powi(2)));
+                                        }
+                                    }
+                                }
+                            }
+                        }
+                        pool.extend(all.iter().copied());
+                        for _ in 0..1 {
+                            for (x, w) in &all {
+                                if *w < 4.0 {
+                                    let r = nalgebra::Vector2::new(1.0, *x);
+                                    a += r * r.transpose();
+                                    y += r * *w;
+                                }
+                            }
+                        }
+                        let s2 = a.try_inverse().unwrap() * y;
+                        let rest = (all.iter().filter(|q| q.1 < 4.0).map(|q| (q.1 - s2[0] - s2[1] * q.0).powi(2)).sum::<f64>()
+                            / all.len() as f64)
+                            .sqrt();
+                        println!(
+                            "   base {:.2} slope {:.4} sd {:.4} T {:.3} n {}",
+                            s2[0],
+                            s2[1],
+                            rest * a.try_inverse().unwrap()[(1, 1)].sqrt(),
+                            (12.0 * s2[1].max(0.0)).sqrt(),
+                            all.len()
+                        );
+                    }
                     if debug {
                         for b in 0..3 {
                             for k in 0..4 {
@@ -120,6 +176,40 @@ fn main() {
                     }
                 }
             }
+        }
+        for upto in [1usize, 3, 100] {
+            let nn = 61;
+            let mut a = nalgebra::DMatrix::<f64>::identity(nn, nn) * 1e-9;
+            let mut y = nalgebra::DVector::zeros(nn);
+            let mut c = 0.0;
+            let mut yy = 0.0;
+            for q in &pool2 {
+                if q.5 % upto.max(1) != 0 && upto < 50 {
+                    continue;
+                }
+                let mut r = nalgebra::DVector::zeros(nn);
+                let g = q.4;
+                r[0] = q.0;
+                let o = 1 + 5 * g;
+                r[o] = 1.0;
+                r[o + 1] = q.2 * q.2 - q.3 * q.3;
+                r[o + 2] = q.2 * q.3;
+                r[o + 3] = q.2;
+                r[o + 4] = q.3;
+                a += &r * r.transpose();
+                y += &r * q.1;
+                c += 1.0;
+                yy += q.1 * q.1;
+            }
+            let inv = a.clone().try_inverse().unwrap();
+            let sol = &inv * &y;
+            let rest = (yy - y.dot(&sol)) / c;
+            println!(
+                "   pooled slope {:.4} sd {:.4} T {:.3}",
+                sol[0],
+                (rest * inv[(0, 0)]).sqrt(),
+                (12.0 * sol[0].max(0.0)).sqrt()
+            );
         }
         println!(
             "== {scene} rms {:.3} mm, {:.3} deg, mean {:?} n {n} halo {:?}",

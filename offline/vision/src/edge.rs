@@ -65,6 +65,16 @@ pub struct RimPoint {
     pub inside: [f32; 3],
     /// Colour a few pixels outside.
     pub outside: [f32; 3],
+    /// From a quarter to three quarters of the change, px.
+    pub width_px: f64,
+}
+
+/// What is found on one normal of an outline.
+struct Crossing {
+    offset_px: f64,
+    inside: [f32; 3],
+    outside: [f32; 3],
+    width_px: f64,
 }
 
 /// Colour between pixels, bilinear; the border goes on outside.
@@ -99,19 +109,21 @@ pub fn rim(image: &RgbImage, intrinsics: &Intrinsics, cone: &Cone, count: usize,
             let inside = pixel.x - intrinsics.pixel(&cone.axis)?.x;
             let other = pixel.y - intrinsics.pixel(&cone.axis)?.y;
             let normal = if normal.x * inside + normal.y * other < 0.0 { -normal } else { normal };
-            crossing(image, pixel, normal, search_px).map(|(offset, inside, outside)| RimPoint {
+            let found = crossing(image, pixel, normal, search_px)?;
+            Some(RimPoint {
                 angle_rad: k as f64 * std::f64::consts::TAU / count as f64,
-                pixel: pixel + normal * offset,
+                pixel: pixel + normal * found.offset_px,
                 normal,
-                inside,
-                outside,
+                inside: found.inside,
+                outside: found.outside,
+                width_px: found.width_px,
             })
         })
         .collect()
 }
 
 /// Offset along the normal at which the colour has changed by half, and the colours on both sides.
-fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_px: f64) -> Option<(f64, [f32; 3], [f32; 3])> {
+fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_px: f64) -> Option<Crossing> {
     let reach = REACH_PX + search_px;
     let count = (2.0 * reach / STEP_PX) as usize + 1;
     let samples: Vec<[f32; 3]> = (0..count)
@@ -141,15 +153,20 @@ fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_p
     let level = |k: usize| (0..3).map(|c| (samples[k][c] - inside[c]) * direction[c]).sum::<f32>() / square;
     // The crossing nearest to the steepest place.
     let span = (2.5 / STEP_PX) as usize;
-    let mut best: Option<f64> = None;
-    for k in steepest - span..steepest + span {
-        let (a, b) = (level(k), level(k + 1));
-        if a <= 0.5 && b > 0.5 {
-            let place = k as f64 + f64::from((0.5 - a) / (b - a));
-            if best.is_none_or(|old| (place - steepest as f64).abs() < (old - steepest as f64).abs()) {
-                best = Some(place);
+    let passes = |wanted: f32, near: f64| {
+        let mut best: Option<f64> = None;
+        for k in steepest - span..steepest + span {
+            let (a, b) = (level(k), level(k + 1));
+            if a <= wanted && b > wanted {
+                let place = k as f64 + f64::from((wanted - a) / (b - a));
+                if best.is_none_or(|old| (place - near).abs() < (old - near).abs()) {
+                    best = Some(place);
+                }
             }
         }
-    }
-    best.map(|place| (place * STEP_PX - reach, inside, outside))
+        best
+    };
+    let place = passes(0.5, steepest as f64)?;
+    let width = passes(0.8, place).filter(|last| *last > place).map_or(f64::NAN, |last| (last - place) * STEP_PX);
+    Some(Crossing { offset_px: place * STEP_PX - reach, inside, outside, width_px: width })
 }

@@ -4,7 +4,7 @@ use crate::associate::{Tolerance, best_triple, hypotheses};
 use crate::camera::Camera;
 use crate::colour::ColourRange;
 use crate::edge::{Cone, colour_at};
-use crate::hough::{self, Window};
+use crate::hough;
 use crate::pose::{Fitted, closed_form, from_bearings};
 use crate::rig::Fixture;
 use crate::sphere::{Expectation, OpeningPrior, Sighting, sight};
@@ -218,6 +218,18 @@ impl Scene<'_> {
         }
     }
 
+    /// A measured frame without some of its views, by ball and camera.
+    ///
+    /// # Errors
+    /// If too little is left.
+    pub fn without(&self, measured: Measured, waiting: &[(usize, usize)]) -> Result<Measured, Lost> {
+        let mut views = measured.views;
+        for (ball, camera) in waiting {
+            views[*ball][*camera] = View::Suspended(Suspended::Returning);
+        }
+        self.combined(views, &measured.fitted.pose).and_then(|measured| self.trusted(measured))
+    }
+
     fn bearings(&self, views: &[View]) -> Vec<Bearing<'_>> {
         let all = views.iter().enumerate().filter_map(|(camera, view)| match view {
             View::Effective(sighting) => Some(self.bearing(camera, sighting)),
@@ -274,9 +286,4 @@ pub fn border_fraction(image: &RgbImage, camera: &Camera, cone: &Cone, range: &C
         pixel.is_some_and(|p| camera.sees(p) && range.holds(colour_at(image, p.x, p.y)))
     };
     f64::from((0..72).filter(|k| holds(*k)).count() as u32) / 72.0
-}
-
-/// The whole image.
-pub fn whole(image: &RgbImage) -> Window {
-    Window { x: 0, y: 0, width: image.width(), height: image.height() }
 }

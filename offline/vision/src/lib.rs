@@ -15,14 +15,18 @@ pub mod frame;
 pub mod hough;
 pub mod least_squares;
 pub mod localise;
+pub mod paper;
 pub mod picture;
 pub mod plane_pose;
 pub mod pose;
+pub mod recording;
 pub mod rig;
 pub mod simplex;
 pub mod sphere;
 pub mod table;
+pub mod track;
 pub mod triangulate;
+pub mod update;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::{Error, Result};
