@@ -69,11 +69,15 @@ pub struct Calibration {
     pub centre_deviation_m: Option<Vec<Vector3<f64>>>,
     /// Covariance of each camera's rotation vector (rad) and centre (m).
     pub pose_covariance: Vec<DMatrix<f64>>,
+    /// Standard deviation of where each camera sees the middle of the work space, px: what its pose and lens leave uncertain.
+    pub bearing_px: Vec<f64>,
     /// What was left out.
     pub contradictions: Vec<Contradiction>,
 }
 
 const PER_CAMERA: usize = 13;
+/// Bearing deviation where it cannot be computed.
+pub const UNKNOWN_BEARING_PX: f64 = 0.3;
 /// Marks further off than this many deviations are taken out and named.
 const GATE: f64 = 4.5;
 
@@ -265,16 +269,36 @@ fn finished(bundle: &Bundle, minimum: &Minimum, contradictions: Vec<Contradictio
     let x = minimum.parameters.as_slice();
     let cameras: Vec<Camera> = (0..bundle.firsts.len()).map(|k| bundle.camera(k, x)).collect();
     let covariance = minimum.covariance();
-    let pose_covariance: Vec<DMatrix<f64>> = covariance.iter().flat_map(|all| blocks(all, cameras.len())).collect();
+    let own: Vec<DMatrix<f64>> = covariance.iter().flat_map(|all| blocks(all, cameras.len())).collect();
+    let pose_covariance: Vec<DMatrix<f64>> = own.iter().map(|block| block.view((0, 0), (6, 6)).into_owned()).collect();
+    let bearing_px = own.iter().enumerate().map(|(index, block)| bearing_deviation_px(bundle, x, index, block)).collect();
     let centre_deviation_m =
         covariance.is_some().then(|| pose_covariance.iter().map(|c| Vector3::from_fn(|k, _| c[(3 + k, 3 + k)].sqrt())).collect());
     let kept: Vec<Pick> = bundle.picks.iter().map(|pick| (*pick).clone()).collect();
     let reprojection_rms_px = reprojection_rms_px(&cameras, &kept);
-    Calibration { cameras, reprojection_rms_px, centre_deviation_m, pose_covariance, contradictions }
+    Calibration { cameras, reprojection_rms_px, centre_deviation_m, pose_covariance, bearing_px, contradictions }
+}
+
+/// Deviation of the pixel of the work space's middle, by all unknowns of a camera together.
+fn bearing_deviation_px(bundle: &Bundle, x: &[f64], index: usize, covariance: &DMatrix<f64>) -> f64 {
+    let middle = bundle.markers.iter().map(|marker| marker.1.coords).sum::<Vector3<f64>>() / bundle.markers.len().max(1) as f64;
+    let steps = bundle.steps();
+    let mut by = DMatrix::zeros(2, PER_CAMERA);
+    for k in 0..PER_CAMERA {
+        let at = PER_CAMERA * index + k;
+        let moved = |sign: f64| {
+            let mut all = x.to_vec();
+            all[at] += sign * steps[at];
+            bundle.camera(index, &all).project(&Point3::from(middle))
+        };
+        let (Some(above), Some(below)) = (moved(1.0), moved(-1.0)) else { return UNKNOWN_BEARING_PX };
+        by.set_column(k, &((above - below) / (2.0 * steps[at])));
+    }
+    ((&by * covariance * by.transpose()).trace() / 2.0).max(0.0).sqrt()
 }
 
 fn blocks(covariance: &DMatrix<f64>, cameras: usize) -> Vec<DMatrix<f64>> {
-    (0..cameras).map(|k| covariance.view((PER_CAMERA * k, PER_CAMERA * k), (6, 6)).into_owned()).collect()
+    (0..cameras).map(|k| covariance.view((PER_CAMERA * k, PER_CAMERA * k), (PER_CAMERA, PER_CAMERA)).into_owned()).collect()
 }
 
 /// RMS over both axes of marked minus predicted pixel, per camera, with the markers where the lab measured them.

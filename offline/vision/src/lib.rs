@@ -4,11 +4,14 @@
 //! Lengths are metres inside, millimetres in files. How it works and what it reaches: `docs/vision.md`.
 #![deny(missing_docs)]
 
+pub mod accuracy;
 pub mod associate;
 pub mod bundle;
 pub mod camera;
+pub mod cameras_file;
 pub mod chessboard;
 pub mod colour;
+pub mod commands;
 pub mod edge;
 pub mod error;
 pub mod frame;
