@@ -177,39 +177,44 @@ fn main() {
                 }
             }
         }
-        for upto in [1usize, 3, 100] {
-            let nn = 61;
-            let mut a = nalgebra::DMatrix::<f64>::identity(nn, nn) * 1e-9;
-            let mut y = nalgebra::DVector::zeros(nn);
-            let mut c = 0.0;
-            let mut yy = 0.0;
-            for q in &pool2 {
-                if q.5 % upto.max(1) != 0 && upto < 50 {
-                    continue;
+        let nf = truth.len();
+        for per_frame in [false, true] {
+            let ns = if per_frame { nf } else { 1 };
+            let nn = 60 + ns;
+            let mut sol = nalgebra::DVector::<f64>::zeros(nn);
+            let mut sd = vec![0.0; ns];
+            for it in 0..8 {
+                let mut a = nalgebra::DMatrix::<f64>::identity(nn, nn) * 1e-9;
+                let mut y = nalgebra::DVector::zeros(nn);
+                let (mut rr, mut cc) = (0.0, 0.0);
+                for q in &pool2 {
+                    let mut r = nalgebra::DVector::<f64>::zeros(nn);
+                    r[if per_frame { q.5 } else { 0 }] = q.0;
+                    let o = ns + 5 * q.4;
+                    r[o] = 1.0;
+                    r[o + 1] = q.2 * q.2 - q.3 * q.3;
+                    r[o + 2] = q.2 * q.3;
+                    r[o + 3] = q.2;
+                    r[o + 4] = q.3;
+                    let res = q.1 - r.dot(&sol);
+                    let w = if it == 0 {
+                        1.0
+                    } else {
+                        let u = res / 1.0;
+                        if u.abs() > 1.0 { 0.0 } else { (1.0 - u * u).powi(2) }
+                    };
+                    rr += w * res * res;
+                    cc += w;
+                    a += &r * r.transpose() * w;
+                    y += &r * (q.1 * w);
                 }
-                let mut r = nalgebra::DVector::zeros(nn);
-                let g = q.4;
-                r[0] = q.0;
-                let o = 1 + 5 * g;
-                r[o] = 1.0;
-                r[o + 1] = q.2 * q.2 - q.3 * q.3;
-                r[o + 2] = q.2 * q.3;
-                r[o + 3] = q.2;
-                r[o + 4] = q.3;
-                a += &r * r.transpose();
-                y += &r * q.1;
-                c += 1.0;
-                yy += q.1 * q.1;
+                let inv = a.try_inverse().unwrap();
+                sol = &inv * &y;
+                for k in 0..ns {
+                    sd[k] = (rr / cc * inv[(k, k)]).sqrt();
+                }
             }
-            let inv = a.clone().try_inverse().unwrap();
-            let sol = &inv * &y;
-            let rest = (yy - y.dot(&sol)) / c;
-            println!(
-                "   pooled slope {:.4} sd {:.4} T {:.3}",
-                sol[0],
-                (rest * inv[(0, 0)]).sqrt(),
-                (12.0 * sol[0].max(0.0)).sqrt()
-            );
+            println!("   robust {:?}", (0..ns).map(|k| format!("{:.4}+-{:.4}", sol[k], sd[k])).collect::<Vec<_>>());
         }
         println!(
             "== {scene} rms {:.3} mm, {:.3} deg, mean {:?} n {n} halo {:?}",

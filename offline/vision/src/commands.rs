@@ -30,7 +30,10 @@ pub struct Calibrated {
 pub fn calibrate(folder: &Path, mode: Mode) -> Result<Calibrated> {
     let rig = rig::read(folder)?;
     let names: Vec<String> = rig.cameras.iter().map(|camera| camera.name.clone()).collect();
-    let picks = read_picks(&folder.join("markers.csv"), &names)?;
+    let mut picks = read_picks(&folder.join("markers.csv"), &names)?;
+    for pick in &mut picks {
+        pick.pixel += nalgebra::Vector2::repeat(0.5 - rig.first_pixel);
+    }
     let firsts = localise::first_poses(&rig, folder, &picks)?;
     let mut calibrated = match mode {
         Mode::Default => jointly(&rig, &firsts, &picks)?,

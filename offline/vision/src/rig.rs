@@ -54,6 +54,15 @@ pub struct RigCamera {
     pub placement: Placement,
 }
 
+/// What the times of the frames mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// They are when the exposure began (else: its middle).
+    pub stamp_at_start: bool,
+    /// How long it took, if the lab knows.
+    pub exposure_s: Option<f64>,
+}
+
 /// The rig as the lab describes it.
 #[derive(Debug, Clone)]
 pub struct Rig {
@@ -67,15 +76,27 @@ pub struct Rig {
     pub fixture: Option<Fixture>,
     /// The cameras in the order of the file.
     pub cameras: Vec<RigCamera>,
+    /// Of the recordings made with it.
+    pub timing: Timing,
+    /// Where the centre of the first pixel lies in the lab's pixel coordinates: 0.5, or 0 as OpenCV counts.
+    pub first_pixel: f64,
 }
 
 #[derive(Deserialize)]
 struct RawRig {
+    first_pixel: Option<f64>,
+    timing: Option<RawTiming>,
     resolution: [u32; 2],
     chessboard: Option<RawBoard>,
     fixture: Option<RawFixture>,
     #[serde(default)]
     camera: Vec<RawCamera>,
+}
+
+#[derive(Deserialize)]
+struct RawTiming {
+    stamp: Option<String>,
+    exposure_ms: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -126,9 +147,15 @@ pub fn read(folder: &Path) -> Result<Rig> {
     }
     let chessboard = raw.chessboard.map(|board| checked_board(&file, &board)).transpose()?;
     let fixture = raw.fixture.map(|fixture| checked_fixture(&file, fixture)).transpose()?;
+    let first_pixel = raw.first_pixel.unwrap_or(0.5);
+    if first_pixel != 0.0 && first_pixel != 0.5 {
+        let what = format!("{first_pixel}");
+        return Err(Error::content(&file, "first_pixel", what, "say 0.5 (counted from the corner) or 0.0 (as OpenCV)"));
+    }
     let mut cameras: Vec<RigCamera> = Vec::new();
     for camera in raw.camera {
-        let camera = checked_camera(&file, size_px, camera)?;
+        let mut camera = checked_camera(&file, size_px, camera)?;
+        camera.intrinsics.centre_px = camera.intrinsics.centre_px.map(|v| v + 0.5 - first_pixel);
         if cameras.iter().any(|other| other.name == camera.name) {
             return Err(Error::content(&file, &camera.name, "stands twice", "give each camera a name of its own"));
         }
@@ -138,7 +165,24 @@ pub fn read(folder: &Path) -> Result<Rig> {
         let what = format!("{} camera(s)", cameras.len());
         return Err(Error::content(&file, "camera", what, "a place in space takes two cameras at least"));
     }
-    Ok(Rig { file, size_px, chessboard, fixture, cameras })
+    let timing = checked_timing(&file, raw.timing)?;
+    Ok(Rig { file, size_px, chessboard, fixture, cameras, timing, first_pixel })
+}
+
+fn checked_timing(file: &Path, raw: Option<RawTiming>) -> Result<Timing> {
+    let Some(raw) = raw else { return Ok(Timing { stamp_at_start: true, exposure_s: None }) };
+    let stamp_at_start = match raw.stamp.as_deref() {
+        None | Some("exposure_start") => true,
+        Some("exposure_middle") => false,
+        Some(other) => {
+            let what = format!("stamp is '{other}'");
+            return Err(Error::content(file, "timing", what, "say exposure_start or exposure_middle"));
+        }
+    };
+    if raw.exposure_ms.is_some_and(|ms| !(0.0..=1000.0).contains(&ms)) {
+        return Err(Error::content(file, "timing", "exposure_ms is not between 0 and 1000", "give it in milliseconds"));
+    }
+    Ok(Timing { stamp_at_start, exposure_s: raw.exposure_ms.map(|ms| ms * 1e-3) })
 }
 
 fn checked_board(file: &Path, board: &RawBoard) -> Result<Chessboard> {

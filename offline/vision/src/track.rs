@@ -8,6 +8,7 @@ use crate::frame::{Lost, Measured, Scene, View};
 use crate::paper::PaperTracker;
 use crate::recording::Recording;
 use crate::rig::{Fixture, Rig};
+use crate::timing;
 use crate::update::Ledger;
 use nalgebra::{Isometry3, Matrix6, Point3};
 use std::path::Path;
@@ -59,6 +60,8 @@ pub struct Tracked {
     pub rows: Vec<Row>,
     /// Colour names in the order of the fixture.
     pub balls: [String; 3],
+    /// Exposure by which poses were moved back to the times of their frames, s.
+    pub exposure_s: Option<f64>,
 }
 
 /// Places of the work space that outlines may have, m from the point all cameras look at.
@@ -121,7 +124,11 @@ pub fn track(
         rows.push(Row { frame: frame.frame, t_s: frame.t_s, found, remarks: remarks.into_iter().flatten().collect(), views });
         progress(rows.len(), recording.frames.len());
     }
-    Ok(Tracked { rows, balls: fixture.balls.clone() })
+    let exposure_s = match mode {
+        Mode::Default => timing::to_frame_times(&mut rows, &scene, &rig.timing),
+        Mode::Paper => None,
+    };
+    Ok(Tracked { rows, balls: fixture.balls.clone(), exposure_s })
 }
 
 fn measured(
