@@ -5,9 +5,22 @@ use image::RgbImage;
 use nalgebra::{Point2, Unit, Vector2, Vector3};
 
 /// Half length of a profile, px.
-const REACH_PX: f64 = 7.0;
-/// Distance of the samples of a profile, px.
-const STEP_PX: f64 = 0.25;
+const REACH_PX: f64 = 5.0;
+
+/// How closely a rim is looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Detail {
+    /// Normals round the outline.
+    pub normals: usize,
+    /// Distance of the samples along each, px.
+    pub step_px: f64,
+}
+
+/// To find a rim.
+pub const COARSE: Detail = Detail { normals: 60, step_px: 0.5 };
+/// To measure it.
+pub const FINE: Detail = Detail { normals: 120, step_px: 0.25 };
+
 /// Least contrast of a rim, in grey levels.
 const CONTRAST: f32 = 12.0;
 
@@ -97,8 +110,10 @@ pub fn colour_at(image: &RgbImage, x: f64, y: f64) -> [f32; 3] {
     })
 }
 
-/// Looks for the rim on `count` normals of a cone's outline, as far as `reach_px` to both sides.
-pub fn rim(image: &RgbImage, intrinsics: &Intrinsics, cone: &Cone, count: usize, search_px: f64) -> Vec<RimPoint> {
+/// Looks for the rim on normals of a cone's outline, as far as `search_px` to both sides.
+pub fn rim(image: &RgbImage, intrinsics: &Intrinsics, cone: &Cone, detail: Detail, search_px: f64) -> Vec<RimPoint> {
+    let count = detail.normals;
+    let middle = intrinsics.pixel(&cone.axis);
     let at = |k: f64| intrinsics.pixel(&cone.ray(k * std::f64::consts::TAU / count as f64));
     (0..count)
         .filter_map(|k| {
@@ -106,10 +121,9 @@ pub fn rim(image: &RgbImage, intrinsics: &Intrinsics, cone: &Cone, count: usize,
             let (before, after) = (at(k as f64 - 0.5)?, at(k as f64 + 0.5)?);
             let along = after - before;
             let normal = Vector2::new(along.y, -along.x).try_normalize(1e-9)?;
-            let inside = pixel.x - intrinsics.pixel(&cone.axis)?.x;
-            let other = pixel.y - intrinsics.pixel(&cone.axis)?.y;
-            let normal = if normal.x * inside + normal.y * other < 0.0 { -normal } else { normal };
-            let found = crossing(image, pixel, normal, search_px)?;
+            let outward = pixel - middle?;
+            let normal = if normal.dot(&outward) < 0.0 { -normal } else { normal };
+            let found = crossing(image, pixel, normal, detail.step_px, search_px)?;
             Some(RimPoint {
                 angle_rad: k as f64 * std::f64::consts::TAU / count as f64,
                 pixel: pixel + normal * found.offset_px,
@@ -123,24 +137,24 @@ pub fn rim(image: &RgbImage, intrinsics: &Intrinsics, cone: &Cone, count: usize,
 }
 
 /// Offset along the normal at which the colour has changed by half, and the colours on both sides.
-fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_px: f64) -> Option<Crossing> {
+fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, step_px: f64, search_px: f64) -> Option<Crossing> {
     let reach = REACH_PX + search_px;
-    let count = (2.0 * reach / STEP_PX) as usize + 1;
+    let count = (2.0 * reach / step_px) as usize + 1;
     let samples: Vec<[f32; 3]> = (0..count)
         .map(|k| {
-            let t = k as f64 * STEP_PX - reach;
+            let t = k as f64 * step_px - reach;
             colour_at(image, pixel.x + t * normal.x, pixel.y + t * normal.y)
         })
         .collect();
     // First the steepest place near the outline, then the levels on both sides of it.
-    let lag = (1.5 / STEP_PX) as usize;
+    let lag = (1.5 / step_px) as usize;
     let change = |k: usize| (0..3).map(|c| (samples[k + lag][c] - samples[k - lag][c]).powi(2)).sum::<f32>();
-    let from = ((reach - search_px) / STEP_PX) as usize;
-    let to = ((reach + search_px) / STEP_PX) as usize;
+    let from = ((reach - search_px) / step_px) as usize;
+    let to = ((reach + search_px) / step_px) as usize;
     let steepest = (from..=to).max_by(|a, b| change(*a).total_cmp(&change(*b)))?;
     let mean = |from_px: f64, to_px: f64| {
-        let first = (steepest as f64 + from_px / STEP_PX).round() as usize;
-        let last = (steepest as f64 + to_px / STEP_PX).round() as usize;
+        let first = (steepest as f64 + from_px / step_px).round() as usize;
+        let last = (steepest as f64 + to_px / step_px).round() as usize;
         let n = (last - first + 1) as f32;
         std::array::from_fn::<f32, 3, _>(|c| samples[first..=last].iter().map(|s| s[c]).sum::<f32>() / n)
     };
@@ -152,7 +166,7 @@ fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_p
     }
     let level = |k: usize| (0..3).map(|c| (samples[k][c] - inside[c]) * direction[c]).sum::<f32>() / square;
     // The crossing nearest to the steepest place.
-    let span = (2.5 / STEP_PX) as usize;
+    let span = (2.0 / step_px) as usize;
     let passes = |wanted: f32, near: f64| {
         let mut best: Option<f64> = None;
         for k in steepest - span..steepest + span {
@@ -167,6 +181,6 @@ fn crossing(image: &RgbImage, pixel: Point2<f64>, normal: Vector2<f64>, search_p
         best
     };
     let place = passes(0.5, steepest as f64)?;
-    let width = passes(0.8, place).filter(|last| *last > place).map_or(f64::NAN, |last| (last - place) * STEP_PX);
-    Some(Crossing { offset_px: place * STEP_PX - reach, inside, outside, width_px: width })
+    let width = passes(0.8, place).filter(|last| *last > place).map_or(f64::NAN, |last| (last - place) * step_px);
+    Some(Crossing { offset_px: place * step_px - reach, inside, outside, width_px: width })
 }

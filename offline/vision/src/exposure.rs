@@ -41,6 +41,8 @@ pub struct Exposure {
     pub deviation_s: f64,
     /// Of frames that differ from it beyond doubt, s; by index of the frame.
     pub different_s: Vec<(usize, f64)>,
+    /// Mean of the robust cost of the rims' variances, px^4: the motion with the least explains them best.
+    pub misfit: f64,
 }
 
 /// Exposure out of rim widths; `None` if motion does not widen them beyond doubt.
@@ -53,7 +55,7 @@ pub fn estimate(widths: &[RimWidth], frames: usize, groups: usize) -> Option<Exp
     if !(scale2 > 1e-6) {
         return None;
     }
-    let (slopes, deviations) = slopes(widths, frames, groups, scale2)?;
+    let (slopes, deviations, misfit) = slopes(widths, frames, groups, scale2)?;
     let mut informed: Vec<usize> = (0..frames).filter(|k| deviations[*k].is_finite()).collect();
     informed.sort_by(|a, b| slopes[*a].total_cmp(&slopes[*b]));
     // The median by weight: frames that stand still say nothing.
@@ -82,19 +84,20 @@ pub fn estimate(widths: &[RimWidth], frames: usize, groups: usize) -> Option<Exp
         .filter(|k| (slopes[**k] - median).abs() > OWN * deviations[**k].max(0.1 * median))
         .map(|k| (*k, seconds(slopes[*k])))
         .collect();
-    Some(Exposure { typical_s, deviation_s: 0.5 * typical_s * deviation / median, different_s })
+    Some(Exposure { typical_s, deviation_s: 0.5 * typical_s * deviation / median, different_s, misfit })
 }
 
 /// Growth of the rims' variance with the square of the speed, per frame, and its deviation; robust least squares.
-fn slopes(widths: &[RimWidth], frames: usize, groups: usize, scale2: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+fn slopes(widths: &[RimWidth], frames: usize, groups: usize, scale2: f64) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     let unknowns = frames + TERMS * groups;
     let mut solution = DVector::<f64>::zeros(unknowns);
     let mut deviations = vec![f64::INFINITY; frames];
+    let mut misfit = f64::INFINITY;
     for round in 0..8 {
         // What no rim speaks of stays at nothing.
         let mut normal = DMatrix::<f64>::identity(unknowns, unknowns) * 1e-6;
         let mut right = DVector::<f64>::zeros(unknowns);
-        let (mut square, mut weights) = (0.0, 0.0);
+        let (mut square, mut weights, mut cost) = (0.0, 0.0, 0.0);
         for width in widths {
             let variance = (f64::from(width.width_px) / WIDTH_OF_UNIT).powi(2);
             let at = frames + TERMS * width.group;
@@ -117,6 +120,7 @@ fn slopes(widths: &[RimWidth], frames: usize, groups: usize, scale2: f64) -> Opt
             };
             square += weight * off * off;
             weights += weight;
+            cost += CUT_PX2 * CUT_PX2 / 6.0 * (1.0 - (1.0 - (ratio * ratio).min(1.0)).powi(3));
             for (i, a) in row {
                 right[i] += weight * a * variance;
                 for (j, b) in row {
@@ -127,6 +131,7 @@ fn slopes(widths: &[RimWidth], frames: usize, groups: usize, scale2: f64) -> Opt
         let inverse = normal.cholesky()?.inverse();
         solution = &inverse * right;
         let variance = square / weights.max(1.0);
+        misfit = cost / widths.len() as f64;
         for (k, deviation) in deviations.iter_mut().enumerate() {
             // Rim points next to one another share pixels.
             *deviation = (2.0 * variance * inverse[(k, k)]).sqrt();
@@ -135,5 +140,5 @@ fn slopes(widths: &[RimWidth], frames: usize, groups: usize, scale2: f64) -> Opt
             }
         }
     }
-    Some((solution.rows(0, frames).iter().copied().collect(), deviations))
+    Some((solution.rows(0, frames).iter().copied().collect(), deviations, misfit))
 }

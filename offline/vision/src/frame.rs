@@ -85,6 +85,8 @@ pub struct Scene<'a> {
 const BORDER: f64 = 0.25;
 /// Circles looked for per colour and camera when nothing is known.
 const CIRCLES: usize = 3;
+/// How far the last round looks, px.
+const FINAL_PX: f64 = 2.0;
 /// A frame whose balls are further than this from the fixture is lost: half of what is called a wrong frame.
 const MOST_RESIDUAL_M: f64 = 1.0e-3;
 /// A frame whose position is known worse than this along any axis is lost.
@@ -101,14 +103,14 @@ impl Scene<'_> {
         }
         let guided = expected.and_then(|(pose, near_px)| {
             let rough = self.guided(images, pose, near_px).ok()?;
-            self.guided(images, &rough.fitted.pose, 3.0).and_then(|measured| self.trusted(measured)).ok()
+            self.guided(images, &rough.fitted.pose, FINAL_PX).and_then(|measured| self.trusted(measured)).ok()
         });
         if let Some(measured) = guided {
             return Ok(measured);
         }
         let rough = self.search(images)?;
         let better = self.guided(images, &rough, 5.0)?;
-        self.guided(images, &better.fitted.pose, 3.0).and_then(|measured| self.trusted(measured))
+        self.guided(images, &better.fitted.pose, FINAL_PX).and_then(|measured| self.trusted(measured))
     }
 
     fn trusted(&self, measured: Measured) -> Result<Measured, Lost> {
@@ -153,13 +155,27 @@ impl Scene<'_> {
     /// Rims where an expected pose has them.
     fn guided(&self, images: &[Option<RgbImage>], pose: &Isometry3<f64>, near_px: f64) -> Result<Measured, Lost> {
         let centres = self.fixture.centres_m().map(|centre| pose * Point3::from(centre));
+        // Cameras are independent of one another: a thread each.
+        let by_camera: Vec<[View; 3]> = std::thread::scope(|scope| {
+            let workers: Vec<_> = images
+                .iter()
+                .enumerate()
+                .map(|(camera, image)| {
+                    let centres = &centres;
+                    scope.spawn(move || {
+                        std::array::from_fn(|ball| match image {
+                            None => View::Suspended(Suspended::NoImage),
+                            Some(image) => self.view(image, camera, ball, centres, near_px),
+                        })
+                    })
+                })
+                .collect();
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        });
         let mut views: [Vec<View>; 3] = [Vec::new(), Vec::new(), Vec::new()];
-        for (ball, views_of_ball) in views.iter_mut().enumerate() {
-            for (camera, image) in images.iter().enumerate() {
-                views_of_ball.push(match image {
-                    None => View::Suspended(Suspended::NoImage),
-                    Some(image) => self.view(image, camera, ball, &centres, near_px),
-                });
+        for of_camera in by_camera {
+            for (ball, view) in of_camera.into_iter().enumerate() {
+                views[ball].push(view);
             }
         }
         self.combined(views, pose)
@@ -183,8 +199,8 @@ impl Scene<'_> {
         let hidden = |direction: &Unit<Vector3<f64>>| nearer.iter().any(|n| n.axis.angle(direction) < n.opening_rad + margin);
         let deviation_rad = (self.halo_px[1].hypot(0.1) + 0.06 * near_px) * px_rad;
         let opening = Some(OpeningPrior { opening_rad: cone.opening_rad, deviation_rad });
-        let search: [f64; 3] = [near_px.max(2.0), 2.0_f64.max(0.6 * near_px), 1.8];
-        let expectation = Expectation { range: &self.ranges[ball], opening, search_px: &search, hidden: &hidden };
+        let search: &[f64] = if near_px > 2.0 { &[near_px, 2.5] } else { &[2.0, 1.8] };
+        let expectation = Expectation { range: &self.ranges[ball], opening, search_px: search, hidden: &hidden };
         let Some(sighting) = sight(image, &own.intrinsics, cone, &expectation) else { return View::Suspended(Suspended::NotFound) };
         if sighting.cone.axis.angle(&cone.axis) > 1.5 * near_px * px_rad {
             return View::Suspended(Suspended::Motion);

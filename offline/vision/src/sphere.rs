@@ -3,14 +3,12 @@
 
 use crate::camera::Intrinsics;
 use crate::colour::ColourRange;
-use crate::edge::{Cone, RimPoint, crosswise, rim};
+use crate::edge::{COARSE, Cone, FINE, RimPoint, crosswise, rim};
 use image::RgbImage;
 use nalgebra::{Matrix3, Point2, Unit, Vector3};
 
-/// Rim normals per ball.
-const NORMALS: usize = 120;
-/// Least number of rim points that carry a fit.
-const LEAST_POINTS: usize = 24;
+/// Least part of the rim that carries a fit.
+const LEAST_VISIBLE: f64 = 0.2;
 /// Least part of the circle, in sectors of 30 degrees, that they have to stand in.
 const LEAST_SECTORS: u32 = 4;
 /// Least scatter assumed of a rim point, px.
@@ -63,7 +61,8 @@ pub fn sight(image: &RgbImage, intrinsics: &Intrinsics, first: Cone, expectation
     let mut cone = first;
     let mut last = None;
     for search_px in expectation.search_px {
-        let points: Vec<Ray> = rim(image, intrinsics, &cone, NORMALS, *search_px)
+        let detail = if *search_px > 2.2 { COARSE } else { FINE };
+        let points: Vec<Ray> = rim(image, intrinsics, &cone, detail, *search_px)
             .into_iter()
             .filter(|point| expectation.range.holds(point.inside) && !expectation.range.holds(point.outside))
             .map(|point| Ray { direction: intrinsics.direction(point.pixel), point })
@@ -71,7 +70,7 @@ pub fn sight(image: &RgbImage, intrinsics: &Intrinsics, first: Cone, expectation
             .collect();
         let px_rad = 1.0 / intrinsics.focal_px[0];
         let start = if *search_px > 2.5 { consensus(&points, &cone, px_rad, *search_px) } else { cone };
-        let fit = settle(&points, start, expectation.opening, px_rad)?;
+        let fit = settle(&points, start, expectation.opening, px_rad, detail.normals)?;
         cone = fit.cone;
         last = Some(fit);
     }
@@ -82,7 +81,7 @@ pub fn sight(image: &RgbImage, intrinsics: &Intrinsics, first: Cone, expectation
     Some(Sighting {
         cone: fit.cone,
         covariance: fit.covariance,
-        visible: fit.points.len() as f64 / NORMALS as f64,
+        visible: fit.points.len() as f64 / FINE.normals as f64,
         scatter_px: fit.scatter_px,
         pixel,
         radius_px: (edge - pixel).norm(),
@@ -104,9 +103,12 @@ struct Fit {
 
 /// Offset of a ray from a cone, rad, and its angle round the axis.
 fn offset(cone: &Cone, direction: &Unit<Vector3<f64>>) -> (f64, f64) {
-    let (a, b) = crosswise(&cone.axis);
-    let angle = direction.dot(&b).atan2(direction.dot(&a));
-    (cone.axis.angle(direction) - cone.opening_rad, angle)
+    offset_in(cone, crosswise(&cone.axis), direction)
+}
+
+fn offset_in(cone: &Cone, (a, b): (Vector3<f64>, Vector3<f64>), direction: &Unit<Vector3<f64>>) -> (f64, f64) {
+    let (x, y) = (direction.dot(&a), direction.dot(&b));
+    (x.hypot(y).atan2(direction.dot(&cone.axis)) - cone.opening_rad, y.atan2(x))
 }
 
 fn shifted(cone: &Cone, by: &Vector3<f64>) -> Cone {
@@ -117,7 +119,8 @@ fn shifted(cone: &Cone, by: &Vector3<f64>) -> Cone {
 
 /// The cone through three rim points that most of the others agree with; the first one if none does better.
 fn consensus(points: &[Ray], first: &Cone, px_rad: f64, search_px: f64) -> Cone {
-    let agree = |cone: &Cone| points.iter().filter(|ray| offset(cone, &ray.direction).0.abs() < 0.8 * px_rad).count();
+    let agree =
+        |cone: &Cone| points.iter().filter(|ray| (cone.axis.angle(&ray.direction) - cone.opening_rad).abs() < 0.8 * px_rad).count();
     let mut best = (agree(first), *first);
     if points.len() < 6 {
         return *first;
@@ -128,7 +131,7 @@ fn consensus(points: &[Ray], first: &Cone, px_rad: f64, search_px: f64) -> Cone 
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % points.len()
     };
-    for _ in 0..120 {
+    for _ in 0..80 {
         let chosen = [next(), next(), next()];
         let mut matrix = Matrix3::zeros();
         let mut right = Vector3::zeros();
@@ -154,15 +157,17 @@ fn consensus(points: &[Ray], first: &Cone, px_rad: f64, search_px: f64) -> Cone 
 }
 
 /// Gauss-Newton with Tukey's weights, the scale from the scatter itself.
-fn settle(points: &[Ray], start: Cone, prior: Option<OpeningPrior>, px_rad: f64) -> Option<Fit> {
+fn settle(points: &[Ray], start: Cone, prior: Option<OpeningPrior>, px_rad: f64, normals: usize) -> Option<Fit> {
     let mut cone = start;
+    let least = LEAST_VISIBLE * normals as f64;
     let mut cut_px = 1.5;
     let mut last = None;
     for _ in 0..12 {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let (mut used, mut square, mut weights, mut sectors) = (Vec::new(), 0.0, 0.0, 0_u32);
+        let frame = crosswise(&cone.axis);
         for ray in points {
-            let (off, angle) = offset(&cone, &ray.direction);
+            let (off, angle) = offset_in(&cone, frame, &ray.direction);
             let ratio = off / px_rad / cut_px;
             if ratio.abs() >= 1.0 {
                 continue;
@@ -176,7 +181,7 @@ fn settle(points: &[Ray], start: Cone, prior: Option<OpeningPrior>, px_rad: f64)
             sectors |= 1 << (((angle / std::f64::consts::TAU + 0.5) * 12.0) as u32 % 12);
             used.push(ray.point);
         }
-        if used.len() < LEAST_POINTS || sectors.count_ones() < LEAST_SECTORS || weights < 0.3 * LEAST_POINTS as f64 {
+        if (used.len() as f64) < least || sectors.count_ones() < LEAST_SECTORS || weights < 0.3 * least {
             return None;
         }
         let scatter_px = (square / weights).sqrt();

@@ -11,6 +11,9 @@ const MOST_FRAMES: usize = 60;
 /// Neighbours further away than this many usual frame times do not tell the velocity.
 const FAR: f64 = 3.5;
 
+/// A smaller misfit by this factor is a clear one.
+const CLEARLY: f64 = 0.99;
+
 /// Motion of the end effector at a frame: angular velocity in the world, rad/s, and velocity, m/s.
 #[derive(Debug, Clone, Copy)]
 struct Motion {
@@ -24,16 +27,29 @@ pub fn to_frame_times(rows: &mut [Row], scene: &crate::frame::Scene, timing: &Ti
         return None;
     }
     let motions: Vec<Option<Motion>> = (0..rows.len()).map(|k| motion(rows, k)).collect();
-    let (exposure, indices) = match timing.exposure_s {
-        Some(exposure_s) => (Exposure { typical_s: exposure_s, deviation_s: 0.0, different_s: Vec::new() }, Vec::new()),
-        None => measured(rows, &motions, scene)?,
+    let (exposure, indices, turning) = match timing.exposure_s {
+        Some(exposure_s) => {
+            (Exposure { typical_s: exposure_s, deviation_s: 0.0, different_s: Vec::new(), misfit: 0.0 }, Vec::new(), true)
+        }
+        None => {
+            // A recording put together from steps is smeared along the end effector's path only: the rims have to say clearly that
+            // turning smears them too.
+            let shifted = measured(rows, &motions, scene, false);
+            let turned = measured(rows, &motions, scene, true);
+            match (shifted, turned) {
+                (Some(s), Some(t)) if t.0.misfit < CLEARLY * s.0.misfit => (t.0, t.1, true),
+                (Some(s), _) => (s.0, s.1, false),
+                (None, t) => t.map(|t| (t.0, t.1, true))?,
+            }
+        }
     };
     for (k, row) in rows.iter_mut().enumerate() {
         let (Ok(found), Some(motion)) = (&mut row.found, motions[k]) else { continue };
         let own = exposure.different_s.iter().find(|(index, _)| indices.get(*index) == Some(&k));
         let exposure_s = own.map_or(exposure.typical_s, |(_, own)| *own);
         // A box shutter is an assumption, good to a quarter of the shift.
-        moved_back(found, &motion, 0.5 * exposure_s, 0.125 * exposure_s + 0.5 * exposure.deviation_s);
+        let unsure_s = 0.125 * exposure_s + 0.5 * exposure.deviation_s;
+        moved_back(found, &motion, 0.5 * exposure_s, unsure_s, turning);
     }
     Some(exposure.typical_s)
 }
@@ -54,7 +70,12 @@ fn motion(rows: &[Row], k: usize) -> Option<Motion> {
 }
 
 /// Exposure by the rims of frames spread over the recording, and which rows these are.
-fn measured(rows: &[Row], motions: &[Option<Motion>], scene: &crate::frame::Scene) -> Option<(Exposure, Vec<usize>)> {
+fn measured(
+    rows: &[Row],
+    motions: &[Option<Motion>],
+    scene: &crate::frame::Scene,
+    turning: bool,
+) -> Option<(Exposure, Vec<usize>)> {
     let step = rows.len().div_ceil(MOST_FRAMES).max(1);
     let indices: Vec<usize> =
         (0..rows.len()).step_by(step).filter(|k| !rows[*k].views.is_empty() && motions[*k].is_some()).collect();
@@ -65,7 +86,8 @@ fn measured(rows: &[Row], motions: &[Option<Motion>], scene: &crate::frame::Scen
         for (ball, views) in rows[*k].views.iter().enumerate() {
             let centre = found.pose * Point3::from(scene.fixture.centres_m()[ball]);
             let arm = centre.coords - found.pose.translation.vector;
-            let velocity_m_s = motion.shift_m_s + motion.turn_rad_s.cross(&arm);
+            let turn = if turning { motion.turn_rad_s.cross(&arm) } else { Vector3::zeros() };
+            let velocity_m_s = motion.shift_m_s + turn;
             for (camera, view) in views.iter().enumerate() {
                 let (View::Effective(sighting), Some(by)) = (view, scene.cameras[camera].pixel_by_point(&centre)) else { continue };
                 let velocity_px_s = by * velocity_m_s;
@@ -79,12 +101,14 @@ fn measured(rows: &[Row], motions: &[Option<Motion>], scene: &crate::frame::Scen
             }
         }
     }
-    Some((estimate(&widths, indices.len(), 3 * cameras)?, indices))
+    let e = estimate(&widths, indices.len(), 3 * cameras)?;
+    Some((e, indices))
 }
 
 /// Moves a pose back in time along its motion, and adds what is not known of that to its covariance.
-fn moved_back(found: &mut Found, motion: &Motion, by_s: f64, unsure_s: f64) {
-    let turn = UnitQuaternion::from_scaled_axis(-motion.turn_rad_s * by_s);
+fn moved_back(found: &mut Found, motion: &Motion, by_s: f64, unsure_s: f64, turning: bool) {
+    let turn_rad_s = if turning { motion.turn_rad_s } else { Vector3::zeros() };
+    let turn = UnitQuaternion::from_scaled_axis(-turn_rad_s * by_s);
     let tip = found.pose.translation.vector;
     for ball in &mut found.balls_m {
         *ball = Point3::from(turn * (ball.coords - tip) + tip - motion.shift_m_s * by_s);
@@ -93,7 +117,7 @@ fn moved_back(found: &mut Found, motion: &Motion, by_s: f64, unsure_s: f64) {
     found.pose.translation.vector -= motion.shift_m_s * by_s;
     if let Some(covariance) = &mut found.covariance {
         let mut along = nalgebra::Vector6::zeros();
-        along.fixed_rows_mut::<3>(0).copy_from(&(motion.turn_rad_s * unsure_s));
+        along.fixed_rows_mut::<3>(0).copy_from(&(motion.turn_rad_s * if turning { unsure_s } else { by_s }));
         along.fixed_rows_mut::<3>(3).copy_from(&(motion.shift_m_s * unsure_s));
         let extra: Matrix6<f64> = along * along.transpose();
         *covariance += extra;
