@@ -11,7 +11,7 @@ use vision::track::Mode;
 
 fn main() -> Result<(), vision::Error> {
     print!("{HEAD}");
-    let mut notes = String::new();
+    let mut notes = Vec::new();
     for folder in std::env::args().skip(1) {
         let folder = Path::new(&folder);
         let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
@@ -31,18 +31,18 @@ fn main() -> Result<(), vision::Error> {
             match compare(&tracked, &truth, fixture) {
                 Some(found) => {
                     print!("{}", lines(&format!("{name}, {label}"), &found));
-                    notes += &format!(
-                        "{name}, {label}: {} of {frames} frames measured, {} wrong, orientation {:.3} deg RMS, {:.1} frames/s\n",
+                    notes.push(format!(
+                        "{name}, {label}: {} of {frames} frames measured, {} wrong, orientation {:.3} deg RMS, {:.1} frames/s",
                         found.measured,
                         found.wrong,
                         found.orientation_deg,
                         frames as f64 / seconds
-                    );
+                    ));
                 }
-                None => notes += &format!("{name}, {label}: 0 of {frames} frames measured\n"),
+                None => notes.push(format!("{name}, {label}: 0 of {frames} frames measured")),
             }
         }
     }
-    print!("\n{notes}");
+    println!("\n{}", notes.join("\n"));
     Ok(())
 }

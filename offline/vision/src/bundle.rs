@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector2, Vector3};
 /// How far the given numbers can be trusted, as standard deviations.
 #[derive(Debug, Clone, Copy)]
 pub struct Priors {
-    /// Of a hand-marked pixel, px.
+    /// Least of a hand-marked pixel, px; what the marks of all cameras scatter by is taken where it is more.
     pub mark_px: f64,
     /// Of a marker's place along each axis, m.
     pub marker_m: f64,
@@ -76,6 +76,8 @@ pub struct Calibration {
 }
 
 const PER_CAMERA: usize = 13;
+/// Nobody marks worse than this, px: beyond it something else is wrong.
+const WORST_MARK_PX: f64 = 5.0;
 /// Bearing deviation where it cannot be computed.
 pub const UNKNOWN_BEARING_PX: f64 = 0.3;
 /// Marks further off than this many deviations are taken out and named.
@@ -215,9 +217,32 @@ fn settled<'a>(rig: &Rig, firsts: &'a [First], picks: &[&'a Pick], priors: &Prio
     for (index, rms) in corner_rms(&bundle, &first).into_iter().enumerate() {
         bundle.corner_px[index] = rms.max(priors.corner_px);
     }
+    // So are marks: with real webcams they scatter by more than the lab thinks.
+    let first = match mark_scatter_px(&bundle, &first) {
+        scatter if scatter > 1.1 * priors.mark_px => {
+            bundle.priors.mark_px = scatter.min(WORST_MARK_PX);
+            bundle.solve(first.parameters).ok_or_else(failed)?
+        }
+        _ => first,
+    };
     bundle.robust = false;
     let softened = bundle.solve(first.parameters).ok_or_else(failed)?;
     Ok((bundle, softened))
+}
+
+/// Standard deviation of a mark along each axis, by the median distance: one bad mark does not count. Each mark spends some of its
+/// freedom on the unknowns.
+fn mark_scatter_px(bundle: &Bundle, minimum: &Minimum) -> f64 {
+    let x = minimum.parameters.as_slice();
+    let distance = |pick: &&Pick| {
+        let seen = bundle.camera(pick.camera, x).project(&bundle.marker(bundle.marker_of(pick), x))?;
+        Some((seen - pick.pixel).norm())
+    };
+    let mut distances: Vec<f64> = bundle.picks.iter().filter_map(distance).collect();
+    distances.sort_by(f64::total_cmp);
+    let median = distances.get(distances.len() / 2).copied().unwrap_or(0.0);
+    let freedom = 1.0 - (6 * bundle.firsts.len() + 2 * bundle.markers.len()) as f64 / (2 * bundle.picks.len()).max(1) as f64;
+    median / 1.177 / freedom.max(0.3).sqrt()
 }
 
 /// RMS of corners per camera, px.

@@ -76,6 +76,9 @@ fn one_by_one(rig: &Rig, firsts: &[localise::First], picks: &[crate::table::Pick
     })
 }
 
+/// Markers this far off, RMS, are not explained by careless marking.
+const USELESS_PX: f64 = 8.0;
+
 /// Says what is odd, and refuses what cannot be used.
 fn remark(rig: &Rig, calibrated: &mut Calibrated) -> Result<()> {
     let cameras: Vec<crate::Camera> = calibrated.cameras.iter().map(|known| known.camera.clone()).collect();
@@ -84,7 +87,7 @@ fn remark(rig: &Rig, calibrated: &mut Calibrated) -> Result<()> {
         calibrated.remarks.push(format!("{}: {what}; move one camera off the line", rig.file.display()));
     }
     for known in &calibrated.cameras {
-        if known.reprojection_rms_px > 20.0 {
+        if known.reprojection_rms_px > USELESS_PX {
             let what = format!("its markers are {:.0} px RMS from where they should be", known.reprojection_rms_px);
             return Err(Error::content(&rig.file, &known.camera.name, what, "check intrinsics, board pose and marks"));
         }
@@ -143,26 +146,23 @@ pub fn truth_text(tracked: &Tracked) -> String {
     text.push_str(",residual_mm,status\n");
     for row in &tracked.rows {
         let _ = write!(text, "{},{:.6}", row.frame, row.t_s);
-        match &row.found {
-            Ok(found) => {
-                let p = found.pose.translation.vector * 1e3;
-                let q = found.pose.rotation.quaternion();
-                let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-                let _ = write!(text, ",{:.4},{:.4},{:.4}", p.x, p.y, p.z);
-                let _ = write!(text, ",{:.6},{:.6},{:.6},{:.6}", sign * q.w, sign * q.i, sign * q.j, sign * q.k);
-                for ball in &order {
-                    let b = found.balls_m[*ball];
-                    let _ = write!(text, ",{:.4},{:.4},{:.4}", b.x * 1e3, b.y * 1e3, b.z * 1e3);
-                }
-                for ball in &order {
-                    let _ = write!(text, ",{}", found.cameras[*ball]);
-                }
-                let _ = writeln!(text, ",{:.4},ok", found.residual_m * 1e3);
+        if let Ok(found) = &row.found {
+            let p = found.pose.translation.vector * 1e3;
+            let q = found.pose.rotation.quaternion();
+            let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+            let _ = write!(text, ",{:.4},{:.4},{:.4}", p.x, p.y, p.z);
+            let _ = write!(text, ",{:.6},{:.6},{:.6},{:.6}", sign * q.w, sign * q.i, sign * q.j, sign * q.k);
+            for ball in &order {
+                let b = found.balls_m[*ball];
+                let _ = write!(text, ",{:.4},{:.4},{:.4}", b.x * 1e3, b.y * 1e3, b.z * 1e3);
             }
-            Err(_) => {
-                text.push_str(&",".repeat(3 + 4 + 9 + 3 + 1));
-                text.push_str(",lost\n");
+            for ball in &order {
+                let _ = write!(text, ",{}", found.cameras[*ball]);
             }
+            let _ = writeln!(text, ",{:.4},ok", found.residual_m * 1e3);
+        } else {
+            text.push_str(&",".repeat(3 + 4 + 9 + 3 + 1));
+            text.push_str(",lost\n");
         }
     }
     text

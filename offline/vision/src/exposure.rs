@@ -52,7 +52,7 @@ pub fn estimate(widths: &[RimWidth], frames: usize, groups: usize) -> Option<Exp
     }
     // Speeds are scaled to a typical one, so that all unknowns are of the same size.
     let scale2 = widths.iter().map(|w| f64::from(w.speed_px_s).powi(2)).sum::<f64>() / widths.len() as f64;
-    if !(scale2 > 1e-6) {
+    if scale2.is_nan() || scale2 <= 1e-6 {
         return None;
     }
     let (slopes, deviations, misfit) = slopes(widths, frames, groups, scale2)?;

@@ -64,6 +64,18 @@ pub enum Lost {
     Doubtful,
 }
 
+impl Lost {
+    /// In words; `balls` are the colours in the order of the fixture.
+    pub fn words(&self, balls: &[String; 3]) -> String {
+        match self {
+            Self::Images => "fewer than two cameras have an image".to_owned(),
+            Self::Ball(ball) => format!("fewer than two cameras see the {} ball well enough", balls[*ball % 3]),
+            Self::Fixture => "the balls found do not stand as the fixture holds them".to_owned(),
+            Self::Doubtful => "what was measured contradicts itself".to_owned(),
+        }
+    }
+}
+
 /// What all frames of a recording share.
 #[derive(Debug)]
 pub struct Scene<'a> {
@@ -103,19 +115,14 @@ impl Scene<'_> {
         }
         let guided = expected.and_then(|(pose, near_px)| {
             let rough = self.guided(images, pose, near_px).ok()?;
-            self.guided(images, &rough.fitted.pose, FINAL_PX).and_then(|measured| self.trusted(measured)).ok()
+            self.guided(images, &rough.fitted.pose, FINAL_PX).and_then(trusted).ok()
         });
         if let Some(measured) = guided {
             return Ok(measured);
         }
         let rough = self.search(images)?;
         let better = self.guided(images, &rough, 5.0)?;
-        self.guided(images, &better.fitted.pose, FINAL_PX).and_then(|measured| self.trusted(measured))
-    }
-
-    fn trusted(&self, measured: Measured) -> Result<Measured, Lost> {
-        let deviation = (0..3).map(|k| measured.fitted.covariance[(3 + k, 3 + k)].sqrt()).fold(0.0, f64::max);
-        if measured.residual_m < MOST_RESIDUAL_M && deviation < MOST_DEVIATION_M { Ok(measured) } else { Err(Lost::Doubtful) }
+        self.guided(images, &better.fitted.pose, FINAL_PX).and_then(trusted)
     }
 
     /// Pose out of circles anywhere in the images.
@@ -243,7 +250,7 @@ impl Scene<'_> {
         for (ball, camera) in waiting {
             views[*ball][*camera] = View::Suspended(Suspended::Returning);
         }
-        self.combined(views, &measured.fitted.pose).and_then(|measured| self.trusted(measured))
+        self.combined(views, &measured.fitted.pose).and_then(trusted)
     }
 
     fn bearings(&self, views: &[View]) -> Vec<Bearing<'_>> {
@@ -292,6 +299,12 @@ impl Scene<'_> {
         }
         all
     }
+}
+
+/// What is measured too badly is lost.
+fn trusted(measured: Measured) -> Result<Measured, Lost> {
+    let deviation = (0..3).map(|k| measured.fitted.covariance[(3 + k, 3 + k)].sqrt()).fold(0.0, f64::max);
+    if measured.residual_m < MOST_RESIDUAL_M && deviation < MOST_DEVIATION_M { Ok(measured) } else { Err(Lost::Doubtful) }
 }
 
 /// Part of a circle just inside an outline that has the ball's colour.

@@ -142,7 +142,7 @@ fn product(edges: &GrayImage, smooth: &GrayImage, colour: &GrayImage) -> Vec<Edg
         }
         let length = sx.hypot(sy);
         // The border of a half plane: neither alone nor amidst the colour.
-        if count >= 5 && count <= 42 && length > 12.0 {
+        if (5..=42).contains(&count) && length > 12.0 {
             // The gradient says the direction better than the mask does; the mask says which way is in.
             let (gx, gy) = gradient(smooth, x, y);
             let slope = gx.hypot(gy);

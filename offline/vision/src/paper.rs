@@ -65,12 +65,12 @@ impl PaperTracker {
         }
         let mut circles: [Vec<(usize, Circle)>; 3] = [Vec::new(), Vec::new(), Vec::new()];
         for (camera, image) in images.iter().enumerate() {
-            for ball in 0..3 {
+            for (ball, own) in circles.iter_mut().enumerate() {
                 let found = image.as_ref().ok_or(Suspended::NoImage).and_then(|image| self.circle(scene, image, camera, ball));
                 let state = &mut self.states[camera][ball];
                 state.frames_since += 1;
                 match found {
-                    Ok(circle) => circles[ball].push((camera, circle)),
+                    Ok(circle) => own.push((camera, circle)),
                     Err(reason) => state.suspended = Some((reason, 0)),
                 }
             }

@@ -58,7 +58,7 @@ fn homography(intrinsics: &Intrinsics, points_m: &[[f64; 2]], pixels: &[Point2<f
 
 fn from_homography(h: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let size = 0.5 * (h.column(0).norm() + h.column(1).norm());
-    if !(size > 1e-12) {
+    if size.is_nan() || size <= 1e-12 {
         return None;
     }
     // The plane stands before the camera.
@@ -67,7 +67,7 @@ fn from_homography(h: &Matrix3<f64>) -> Option<Isometry3<f64>> {
     let axes = Matrix3::from_columns(&[a, b, a.cross(&b)]);
     let svd = axes.svd(true, true);
     let rotation = svd.u? * svd.v_t?;
-    if !(rotation.determinant() > 0.5) {
+    if rotation.determinant().is_nan() || rotation.determinant() <= 0.5 {
         return None;
     }
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));

@@ -267,7 +267,8 @@ pub fn absurdity(intrinsics: &Intrinsics, size_px: [u32; 2]) -> Option<String> {
     }
     let [k1, k2, p1, p2] = intrinsics.distortion;
     let corner2 = (width * width + height * height) / (4.0 * fx * fx);
-    let folds = |r2: f64| !(1.0 + r2 * (3.0 * k1 + 5.0 * k2 * r2) > 0.05);
+    let slope = |r2: f64| 1.0 + r2 * (3.0 * k1 + 5.0 * k2 * r2);
+    let folds = |r2: f64| slope(r2).is_nan() || slope(r2) <= 0.05;
     if folds(corner2) || folds(corner2 / 2.0) || !(p1.abs() < 0.1 && p2.abs() < 0.1) {
         return Some(format!("distortion [{k1}, {k2}, {p1}, {p2}] folds the image"));
     }

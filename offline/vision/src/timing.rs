@@ -28,20 +28,8 @@ pub fn to_frame_times(rows: &mut [Row], scene: &crate::frame::Scene, timing: &Ti
     }
     let motions: Vec<Option<Motion>> = (0..rows.len()).map(|k| motion(rows, k)).collect();
     let (exposure, indices, turning) = match timing.exposure_s {
-        Some(exposure_s) => {
-            (Exposure { typical_s: exposure_s, deviation_s: 0.0, different_s: Vec::new(), misfit: 0.0 }, Vec::new(), true)
-        }
-        None => {
-            // A recording put together from steps is smeared along the end effector's path only: the rims have to say clearly that
-            // turning smears them too.
-            let shifted = measured(rows, &motions, scene, false);
-            let turned = measured(rows, &motions, scene, true);
-            match (shifted, turned) {
-                (Some(s), Some(t)) if t.0.misfit < CLEARLY * s.0.misfit => (t.0, t.1, true),
-                (Some(s), _) => (s.0, s.1, false),
-                (None, t) => t.map(|t| (t.0, t.1, true))?,
-            }
-        }
+        Some(typical_s) => (Exposure { typical_s, deviation_s: 0.0, different_s: Vec::new(), misfit: 0.0 }, Vec::new(), true),
+        None => by_rims(rows, &motions, scene)?,
     };
     for (k, row) in rows.iter_mut().enumerate() {
         let (Ok(found), Some(motion)) = (&mut row.found, motions[k]) else { continue };
@@ -52,6 +40,18 @@ pub fn to_frame_times(rows: &mut [Row], scene: &crate::frame::Scene, timing: &Ti
         moved_back(found, &motion, 0.5 * exposure_s, unsure_s, turning);
     }
     Some(exposure.typical_s)
+}
+
+/// Exposure, rows looked at, and whether turning smears rims too. A recording put together from steps is smeared along the end
+/// effector's path only: the rims have to say clearly that turning smears them too.
+fn by_rims(rows: &[Row], motions: &[Option<Motion>], scene: &crate::frame::Scene) -> Option<(Exposure, Vec<usize>, bool)> {
+    let shifted = measured(rows, motions, scene, false);
+    let turned = measured(rows, motions, scene, true);
+    match (shifted, turned) {
+        (Some(s), Some(t)) if t.0.misfit < CLEARLY * s.0.misfit => Some((t.0, t.1, true)),
+        (Some(s), _) => Some((s.0, s.1, false)),
+        (None, t) => t.map(|t| (t.0, t.1, true)),
+    }
 }
 
 /// Velocity by the neighbours, on both sides where there are two.
@@ -101,8 +101,7 @@ fn measured(
             }
         }
     }
-    let e = estimate(&widths, indices.len(), 3 * cameras)?;
-    Some((e, indices))
+    Some((estimate(&widths, indices.len(), 3 * cameras)?, indices))
 }
 
 /// Moves a pose back in time along its motion, and adds what is not known of that to its covariance.
