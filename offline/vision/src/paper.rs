@@ -97,7 +97,7 @@ impl PaperTracker {
     fn circle(&self, scene: &Scene, image: &RgbImage, camera: usize, ball: usize) -> Result<Circle, Suspended> {
         let state = &self.states[camera][ball];
         let range = &scene.ranges[ball];
-        let allowed_px = state.last.map(|last| MOTION[0] + MOTION[1] * last.radius_px * f64::from(state.frames_since));
+        let allowed_px = state.last.map(|last| MOTION[0] + MOTION[1] * last.radius_px * f64::from(state.frames_since + 1));
         let window = match (state.last, allowed_px) {
             (Some(last), Some(allowed)) => around(&last, allowed + state.radius_px[1] + 12.0, image),
             _ => hough::extent(image, range, 12).ok_or(Suspended::NotFound)?,
