@@ -1,9 +1,13 @@
 //! A measured recording against the truth, as the paper's Table I: error per axis and in space, RMS and standard deviation.
 
+use crate::camera::{Camera, Intrinsics};
+use crate::edge::Cone;
 use crate::error::{Error, Result};
+use crate::pose::from_bearings;
 use crate::rig::Fixture;
 use crate::track::Tracked;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use crate::triangulate::Bearing;
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// The true pose of a frame.
@@ -70,6 +74,47 @@ pub fn read_truth(file: &Path) -> Result<Vec<TruePose>> {
     Ok(poses)
 }
 
+/// Reads the true cameras of a rendered scene (`cameras_true.json`: per camera C in mm, R, f, c, k), in the order of `names`.
+///
+/// # Errors
+/// If it cannot be read or does not hold 19 numbers per camera.
+pub fn read_true_cameras(file: &Path, names: &[String], size_px: [u32; 2]) -> Result<Vec<Camera>> {
+    let text = std::fs::read_to_string(file).map_err(Error::read(file))?;
+    let is_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
+    let numbers: Vec<f64> = text.split(|c: char| !is_number(c)).filter_map(|token| token.parse().ok()).collect();
+    if numbers.len() != 19 * names.len() {
+        let what = format!("{} numbers for {} cameras", numbers.len(), names.len());
+        return Err(Error::content(file, "cameras", what, "give C, R, f, c and k of each camera"));
+    }
+    let camera = |(name, n): (&String, &[f64])| Camera {
+        name: name.clone(),
+        rotation: Rotation3::from_matrix(&Matrix3::from_row_slice(&n[3..12])),
+        centre_m: Point3::new(n[0], n[1], n[2]) * 1e-3,
+        intrinsics: Intrinsics { focal_px: [n[12]; 2], centre_px: [n[13], n[14]], distortion: [n[15], n[16], n[17], n[18]] },
+        size_px,
+    };
+    Ok(names.iter().zip(numbers.chunks(19)).map(camera).collect())
+}
+
+/// Error of the end effector that the cameras alone make: with circles as the true cameras would see them.
+pub fn of_cameras(cameras: &[Camera], true_cameras: &[Camera], truth: &[TruePose], fixture: &Fixture) -> Option<Spread> {
+    let error = |own: &TruePose| {
+        let pose = Isometry3::from_parts(Translation3::from(own.position_m), own.rotation);
+        let mut bearings: [Vec<Bearing>; 3] = [Vec::new(), Vec::new(), Vec::new()];
+        for (views, centre) in bearings.iter_mut().zip(fixture.centres_m()) {
+            for (camera, real) in cameras.iter().zip(true_cameras) {
+                let cone = Cone::of_sphere(&real.local(&(pose * Point3::from(centre))), fixture.ball_radius_m)?;
+                // What the true camera sees, put through the lens that is believed.
+                let axis: Unit<Vector3<f64>> = camera.intrinsics.direction(real.intrinsics.pixel(&cone.axis)?);
+                views.push(Bearing { camera, axis, covariance: Matrix2::identity() * 1e-8 });
+            }
+        }
+        let found = from_bearings(&fixture.centres_m(), &bearings, &pose)?;
+        Some((found.pose.translation.vector - own.position_m) * 1e3)
+    };
+    spread(&truth.iter().filter_map(error).collect::<Vec<_>>())
+}
+
 /// Compares frames of the same number; `None` if no measured frame has a truth.
 pub fn compare(tracked: &Tracked, truth: &[TruePose], fixture: &Fixture) -> Option<Accuracy> {
     let (mut balls, mut tips, mut angles) = (Vec::new(), Vec::new(), Vec::new());
@@ -106,11 +151,13 @@ fn spread(errors_mm: &[Vector3<f64>]) -> Option<Spread> {
 
 /// Lines of a table for one measurement, under a name.
 pub fn lines(name: &str, accuracy: &Accuracy) -> String {
-    let row = |what: &str, s: &Spread| {
-        let cells = |v: &[f64; 4]| v.map(|x| format!("{x:.3}")).join(" | ");
-        format!("| {name} | {what} | {} | {} | {:.3} |\n", cells(&s.rms_mm), cells(&s.sd_mm), s.worst_mm)
-    };
-    format!("{}{}", row("single ball", &accuracy.ball), row("end effector", &accuracy.end_effector))
+    format!("{}{}", line(name, "single ball", &accuracy.ball), line(name, "end effector", &accuracy.end_effector))
+}
+
+/// One line of the table.
+pub fn line(name: &str, what: &str, spread: &Spread) -> String {
+    let cells = |v: &[f64; 4]| v.map(|x| format!("{x:.3}")).join(" | ");
+    format!("| {name} | {what} | {} | {} | {:.3} |\n", cells(&spread.rms_mm), cells(&spread.sd_mm), spread.worst_mm)
 }
 
 /// Head of the table that [`lines`] fills.

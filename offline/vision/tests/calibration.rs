@@ -118,3 +118,26 @@ fn cameras_toml_reads_back_as_written() {
         assert_eq!(a.camera.intrinsics, b.camera.intrinsics);
     }
 }
+
+#[test]
+fn a_dim_noisy_board_is_found() {
+    let Some(folder) = data("vision-rendered") else { return };
+    let sound = calibrate(&folder.join("hard"), Mode::Default).expect("cameras");
+    let scene = Folder::of_scene("dim", &folder.join("hard"), 0);
+    for camera in 0..4 {
+        scene.repaint(&format!("chessboard/cam{camera}.jpg"), |image| {
+            let mut state = 7_u64;
+            let mut changed = image.clone();
+            for pixel in changed.pixels_mut() {
+                for value in &mut pixel.0 {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    let noise = ((state >> 40) % 17) as f64 - 8.0;
+                    *value = (f64::from(*value) * 0.3 + 20.0 + noise).clamp(0.0, 255.0) as u8;
+                }
+            }
+            changed
+        });
+    }
+    let found = calibrate(&scene.0, Mode::Default).expect("cameras");
+    assert!(farthest_mm(&found, &sound) < 0.5, "{}", farthest_mm(&found, &sound));
+}
