@@ -21,6 +21,11 @@ struct Motion {
     shift_m_s: Vector3<f64>,
 }
 
+/// Every so many frames are looked at in a recording of so many.
+pub fn step(frames: usize) -> usize {
+    frames.div_ceil(MOST_FRAMES).max(1)
+}
+
 /// Moves all poses of a recording to the times of their frames; answers what exposure was found.
 pub fn to_frame_times(rows: &mut [Row], scene: &crate::frame::Scene, timing: &Timing) -> Option<f64> {
     if !timing.stamp_at_start {

@@ -5,7 +5,7 @@ use crate::colour;
 use crate::edge::Cone;
 use crate::error::{Error, Result};
 use crate::frame::{Lost, Measured, Scene, View};
-use crate::paper::PaperTracker;
+use crate::paper::{PaperFrame, PaperTracker};
 use crate::recording::Recording;
 use crate::rig::{Fixture, Rig};
 use crate::timing;
@@ -49,7 +49,7 @@ pub struct Row {
     pub found: std::result::Result<Found, Lost>,
     /// Images that were missing or black.
     pub remarks: Vec<String>,
-    /// Views by ball and camera; empty in paper mode and in lost frames.
+    /// Views by ball and camera; empty in paper mode and in lost frames. Rim points are kept of frames spread over the recording.
     pub views: Vec<Vec<View>>,
 }
 
@@ -66,6 +66,8 @@ pub struct Tracked {
 
 /// Places of the work space that outlines may have, m from the point all cameras look at.
 const WORKSPACE_M: f64 = 0.16;
+/// Outlines that the halo is taken from.
+const HALOS: usize = 600;
 /// Frames from which colours are learnt.
 const COLOUR_FRAMES: usize = 8;
 
@@ -99,36 +101,55 @@ pub fn track(
     let mut ledger = Ledger::new(cameras.len(), mode == Mode::Paper);
     let mut paper = PaperTracker::new(&scene);
     let (mut rows, mut halos) = (Vec::new(), Vec::new());
-    for frame in &recording.frames {
-        let (images, remarks): (Vec<_>, Vec<_>) = recording.images(frame)?.into_iter().unzip();
-        let (found, views) = match mode {
-            Mode::Paper => (
-                paper.measure(&scene, &images).map(|f| Found {
-                    pose: f.pose,
-                    covariance: None,
-                    balls_m: f.balls_m,
-                    cameras: f.cameras,
-                    residual_m: f.residual_m,
-                }),
-                Vec::new(),
-            ),
-            Mode::Default => match measured(&scene, &images, &mut ledger, frame.t_s) {
-                Ok(measured) => {
-                    halos.extend(scene.halos_px(&measured));
-                    scene.halo_px = halo(&mut halos);
-                    (Ok(found(&measured)), measured.views.to_vec())
-                }
-                Err(lost) => (Err(lost), Vec::new()),
-            },
+    let frames = &recording.frames;
+    let mut next = frames.first().map(|frame| recording.images(frame));
+    for (index, frame) in frames.iter().enumerate() {
+        let Some(read) = next.take() else { break };
+        let (images, remarks): (Vec<_>, Vec<_>) = read?.into_iter().unzip();
+        // The next frame is read while this one is measured.
+        let (result, ahead) = std::thread::scope(|scope| {
+            let reader = frames.get(index + 1).map(|frame| scope.spawn(|| recording.images(frame)));
+            let result = match mode {
+                Mode::Paper => paper.measure(&scene, &images).map(|frame| (of_paper(&frame), None)),
+                Mode::Default => measured(&scene, &images, &mut ledger, frame.t_s).map(|m| (found(&m), Some(m))),
+            };
+            (result, reader.map(|reader| reader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
+        });
+        next = ahead;
+        let (found, views) = match result {
+            Ok((found, Some(measured))) => {
+                halos.extend(scene.halos_px(&measured));
+                halos.drain(..halos.len().saturating_sub(HALOS));
+                scene.halo_px = halo(&halos);
+                (Ok(found), kept(measured.views, index % timing::step(frames.len()) == 0))
+            }
+            Ok((found, None)) => (Ok(found), Vec::new()),
+            Err(lost) => (Err(lost), Vec::new()),
         };
         rows.push(Row { frame: frame.frame, t_s: frame.t_s, found, remarks: remarks.into_iter().flatten().collect(), views });
-        progress(rows.len(), recording.frames.len());
+        progress(rows.len(), frames.len());
     }
     let exposure_s = match mode {
         Mode::Default => timing::to_frame_times(&mut rows, &scene, &rig.timing),
         Mode::Paper => None,
     };
     Ok(Tracked { rows, balls: fixture.balls.clone(), exposure_s })
+}
+
+/// Views of a frame; the points of their rims are many and needed of few frames only.
+fn kept(mut views: [Vec<View>; 3], points: bool) -> Vec<Vec<View>> {
+    for view in views.iter_mut().flatten() {
+        if let View::Effective(sighting) = view
+            && !points
+        {
+            sighting.points = Vec::new();
+        }
+    }
+    views.to_vec()
+}
+
+fn of_paper(frame: &PaperFrame) -> Found {
+    Found { pose: frame.pose, covariance: None, balls_m: frame.balls_m, cameras: frame.cameras, residual_m: frame.residual_m }
 }
 
 fn measured(
@@ -159,10 +180,11 @@ fn found(measured: &Measured) -> Found {
     }
 }
 
-/// Median halo of the recording so far, and how well it is known.
-fn halo(halos: &mut [f64]) -> [f64; 2] {
-    halos.sort_by(f64::total_cmp);
-    if halos.len() < 10 { [0.15, 0.25] } else { [halos[halos.len() / 2], 0.1] }
+/// Median halo of the last outlines, and how well it is known.
+fn halo(halos: &[f64]) -> [f64; 2] {
+    let mut sorted = halos.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    if sorted.len() < 10 { [0.15, 0.25] } else { [sorted[sorted.len() / 2], 0.1] }
 }
 
 /// The point nearest to all optical axes: the middle of the work space.
