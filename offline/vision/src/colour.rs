@@ -28,6 +28,8 @@ pub struct ColourRange {
     pub half_deg: [f64; 2],
     /// Least chroma (largest minus smallest channel), grey levels.
     pub chroma: f32,
+    /// Factors of red, green, blue that make grey things grey in this light.
+    pub balance: [f32; 3],
 }
 
 /// Hue in degrees and chroma in grey levels.
@@ -56,10 +58,31 @@ pub fn hue_difference(a_deg: f64, b_deg: f64) -> f64 {
 impl ColourRange {
     /// Is a colour in the range?
     pub fn holds(&self, rgb: [f32; 3]) -> bool {
-        let (hue, chroma) = hue_chroma(rgb);
+        let (hue, chroma) = hue_chroma(balanced(rgb, self.balance));
         let off = hue_difference(hue, self.hue_deg);
         chroma >= self.chroma && off >= -self.half_deg[0] && off <= self.half_deg[1]
     }
+}
+
+fn balanced(rgb: [f32; 3], balance: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|k| rgb[k] * balance[k])
+}
+
+/// Factors by which most of what is seen becomes grey: medians of red and blue against green. The balls are a small part of it.
+fn white_balance(pixels: &[[f32; 3]]) -> [f32; 3] {
+    let lit: Vec<&[f32; 3]> = pixels.iter().filter(|rgb| rgb.iter().sum::<f32>() > 60.0 && rgb[1] > 8.0).collect();
+    if lit.len() * 20 < pixels.len() {
+        return [1.0; 3];
+    }
+    let ratio = |k: usize| {
+        let mut all: Vec<f32> = lit.iter().map(|rgb| rgb[1] / rgb[k].max(1.0)).collect();
+        let middle = all.len() / 2;
+        let (_, median, _) = all.select_nth_unstable_by(middle, f32::total_cmp);
+        median.clamp(0.33, 3.0)
+    };
+    let (red, blue) = (ratio(0), ratio(2));
+    let mean = (red + 1.0 + blue) / 3.0;
+    [red / mean, 1.0 / mean, blue / mean]
 }
 
 /// Pixels of a thinned image, 2 x 2 of them averaged: noise halves, edges stay few.
@@ -80,15 +103,15 @@ fn thinned(image: &RgbImage) -> impl Iterator<Item = [f32; 3]> + '_ {
 
 /// Learns the ranges of named colours from some images of a recording.
 pub fn learn<'a>(names: &[String; 3], images: impl Iterator<Item = &'a RgbImage>) -> [ColourRange; 3] {
+    let colours: Vec<[f32; 3]> = images.flat_map(thinned).collect();
+    let balance = white_balance(&colours);
     let mut pixels = Vec::new();
     let mut chromas = vec![0_u32; 256];
-    for image in images {
-        for rgb in thinned(image) {
-            let (hue, chroma) = hue_chroma(rgb);
-            chromas[(chroma as usize).min(255)] += 1;
-            if chroma > 8.0 {
-                pixels.push((hue, chroma));
-            }
+    for rgb in colours {
+        let (hue, chroma) = hue_chroma(balanced(rgb, balance));
+        chromas[(chroma as usize).min(255)] += 1;
+        if chroma > 8.0 {
+            pixels.push((hue, chroma));
         }
     }
     let grey = grey_chroma(&chromas);
@@ -110,7 +133,7 @@ pub fn learn<'a>(names: &[String; 3], images: impl Iterator<Item = &'a RgbImage>
                 .fold(360.0, f64::min);
             (0.48 * gap).min(HALF_RANGE_DEG)
         };
-        let mut range = ColourRange { hue_deg: peaks[k], half_deg: [half(-1.0), half(1.0)], chroma: grey };
+        let mut range = ColourRange { hue_deg: peaks[k], half_deg: [half(-1.0), half(1.0)], chroma: grey, balance };
         let mut own: Vec<f32> = pixels
             .iter()
             .filter(|(hue, chroma)| {

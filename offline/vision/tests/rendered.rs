@@ -55,7 +55,7 @@ fn warm_dim_light_and_noise_change_little() {
                 };
                 let mut changed = image.clone();
                 for pixel in changed.pixels_mut() {
-                    for (value, gain) in pixel.0.iter_mut().zip([0.75, 0.62, 0.5]) {
+                    for (value, gain) in pixel.0.iter_mut().zip([0.9, 0.55, 0.33]) {
                         *value = (f64::from(*value) * gain + noise()).clamp(0.0, 255.0) as u8;
                     }
                 }
