@@ -8,6 +8,7 @@ use crate::camera::{Camera, Intrinsics};
 use crate::error::{Error, Result};
 use crate::least_squares::{Minimum, minimise};
 use crate::localise::{First, POSE_STEPS, board_points_m, displaced, enough_markers};
+use crate::marks::{Contradiction, corner_rms, mark_scatter_px, worst_mark};
 use crate::plane_pose::moved;
 use crate::rig::Rig;
 use crate::table::Pick;
@@ -45,19 +46,6 @@ impl Default for Priors {
     }
 }
 
-/// A mark or a marker that contradicts all others.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Contradiction {
-    /// Name of the marker.
-    pub marker: String,
-    /// Name of the camera; `None` if the marker's own place contradicts its images.
-    pub camera: Option<String>,
-    /// Line in `markers.csv`.
-    pub line: usize,
-    /// How far it is off, px.
-    pub off_px: f64,
-}
-
 /// Cameras and how well they are known.
 #[derive(Debug, Clone)]
 pub struct Calibration {
@@ -80,16 +68,13 @@ const PER_CAMERA: usize = 13;
 const WORST_MARK_PX: f64 = 5.0;
 /// Bearing deviation where it cannot be computed.
 pub const UNKNOWN_BEARING_PX: f64 = 0.3;
-/// Marks further off than this many deviations are taken out and named.
-const GATE: f64 = 4.5;
-
-struct Bundle<'a> {
-    firsts: &'a [First],
-    picks: Vec<&'a Pick>,
-    markers: Vec<(String, Point3<f64>)>,
-    board_m: Vec<[f64; 2]>,
-    corner_px: Vec<f64>,
-    priors: Priors,
+pub(crate) struct Bundle<'a> {
+    pub(crate) firsts: &'a [First],
+    pub(crate) picks: Vec<&'a Pick>,
+    pub(crate) markers: Vec<(String, Point3<f64>)>,
+    pub(crate) board_m: Vec<[f64; 2]>,
+    pub(crate) corner_px: Vec<f64>,
+    pub(crate) priors: Priors,
     robust: bool,
 }
 
@@ -109,7 +94,7 @@ impl Bundle<'_> {
         DVector::from_vec([all, rest].concat())
     }
 
-    fn camera(&self, index: usize, x: &[f64]) -> Camera {
+    pub(crate) fn camera(&self, index: usize, x: &[f64]) -> Camera {
         let own = &x[PER_CAMERA * index..PER_CAMERA * (index + 1)];
         let mut camera = displaced(&self.firsts[index].camera, &own[..6]);
         let was = camera.intrinsics;
@@ -122,12 +107,12 @@ impl Bundle<'_> {
         camera
     }
 
-    fn marker(&self, index: usize, x: &[f64]) -> Point3<f64> {
+    pub(crate) fn marker(&self, index: usize, x: &[f64]) -> Point3<f64> {
         let at = PER_CAMERA * self.firsts.len() + 3 * index;
         self.markers[index].1 + Vector3::new(x[at], x[at + 1], x[at + 2])
     }
 
-    fn marker_of(&self, pick: &Pick) -> usize {
+    pub(crate) fn marker_of(&self, pick: &Pick) -> usize {
         self.markers.iter().position(|marker| marker.0 == pick.marker).unwrap_or(0)
     }
 
@@ -228,66 +213,6 @@ fn settled<'a>(rig: &Rig, firsts: &'a [First], picks: &[&'a Pick], priors: &Prio
     bundle.robust = false;
     let softened = bundle.solve(first.parameters).ok_or_else(failed)?;
     Ok((bundle, softened))
-}
-
-/// Standard deviation of a mark along each axis, by the median distance: one bad mark does not count. Each mark spends some of its
-/// freedom on the unknowns.
-fn mark_scatter_px(bundle: &Bundle, minimum: &Minimum) -> f64 {
-    let x = minimum.parameters.as_slice();
-    let distance = |pick: &&Pick| {
-        let seen = bundle.camera(pick.camera, x).project(&bundle.marker(bundle.marker_of(pick), x))?;
-        Some((seen - pick.pixel).norm())
-    };
-    let mut distances: Vec<f64> = bundle.picks.iter().filter_map(distance).collect();
-    distances.sort_by(f64::total_cmp);
-    let median = distances.get(distances.len() / 2).copied().unwrap_or(0.0);
-    let freedom = 1.0 - (6 * bundle.firsts.len() + 2 * bundle.markers.len()) as f64 / (2 * bundle.picks.len()).max(1) as f64;
-    median / 1.177 / freedom.max(0.3).sqrt()
-}
-
-/// RMS of corners per camera, px.
-fn corner_rms(bundle: &Bundle, minimum: &Minimum) -> Vec<f64> {
-    let mut at = 2 * bundle.picks.len();
-    let mut all = Vec::new();
-    for (index, first) in bundle.firsts.iter().enumerate() {
-        at += 7;
-        let count = if first.board.is_some() { 2 * bundle.board_m.len() } else { 0 };
-        let sum = minimum.residuals.rows(at, count).norm_squared();
-        all.push(if count > 0 { (sum / count as f64).sqrt() * bundle.corner_px[index] } else { 0.0 });
-        at += count;
-    }
-    all
-}
-
-/// The mark, or the marker, that contradicts most, if it does so beyond doubt.
-fn worst_mark(bundle: &Bundle, minimum: &Minimum, firsts: &[First]) -> Option<Contradiction> {
-    let x = minimum.parameters.as_slice();
-    let cameras: Vec<Camera> = (0..firsts.len()).map(|k| bundle.camera(k, x)).collect();
-    let mut worst: Option<(f64, Contradiction)> = None;
-    let mut consider = |score: f64, made: Contradiction| {
-        if score > GATE && worst.as_ref().is_none_or(|(most, _)| score > *most) {
-            worst = Some((score, made));
-        }
-    };
-    for pick in &bundle.picks {
-        let seen = cameras[pick.camera].project(&bundle.marker(bundle.marker_of(pick), x))?;
-        let off_px = (seen - pick.pixel).norm();
-        let camera = Some(firsts[pick.camera].camera.name.clone());
-        consider(off_px / bundle.priors.mark_px, Contradiction { marker: pick.marker.clone(), camera, line: pick.line, off_px });
-    }
-    for (index, (name, place)) in bundle.markers.iter().enumerate() {
-        let views: Vec<&&Pick> = bundle.picks.iter().filter(|pick| pick.marker == *name).collect();
-        let shift = bundle.marker(index, x) - place;
-        if views.len() < 2 {
-            continue;
-        }
-        let first = views[0];
-        let off_px = cameras[first.camera].pixel_by_point(place).map_or(0.0, |by| (by * shift).norm());
-        // A shift is drawn by one bad mark too; the mark's own residual is larger then.
-        let made = Contradiction { marker: name.clone(), camera: None, line: first.line, off_px };
-        consider(shift.norm() / bundle.priors.marker_m, made);
-    }
-    worst.map(|(_, contradiction)| contradiction)
 }
 
 fn finished(bundle: &Bundle, minimum: &Minimum, contradictions: Vec<Contradiction>) -> Calibration {

@@ -19,6 +19,7 @@ pub mod frame;
 pub mod hough;
 pub mod least_squares;
 pub mod localise;
+pub mod marks;
 pub mod paper;
 pub mod picture;
 pub mod plane_pose;
