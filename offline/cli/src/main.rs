@@ -17,6 +17,7 @@ mod prove;
 mod record;
 mod simulate;
 mod stats;
+mod vision;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -180,6 +181,9 @@ enum Command {
         #[arg(long, default_value = "/run/ravenpose")]
         runtime_dir: PathBuf,
     },
+    /// True pose of the end effector from webcams and three coloured balls
+    #[command(subcommand)]
+    Vision(vision::Wish),
     /// Is this machine ready for hard real time? Exact remedies
     Check {
         /// Core that the loop will be pinned to
@@ -224,6 +228,7 @@ fn main() -> ExitCode {
             })
         }
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
+        Command::Vision(wish) => vision::run(&wish),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };
     match done {

@@ -26,6 +26,11 @@ impl Progress {
         Self::new("{bar:40} {pos}/{len} s simulated, {eta} left")
     }
 
+    /// Frames of a recording.
+    pub(crate) fn frames() -> Self {
+        Self::new("{bar:40} {pos}/{len} frames, {eta} left")
+    }
+
     fn new(template: &'static str) -> Self {
         Self { begun: Instant::now(), bar: None, template, terminal: std::io::stderr().is_terminal() }
     }
