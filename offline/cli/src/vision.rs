@@ -51,9 +51,9 @@ fn mode(paper: bool) -> Mode {
 fn calibrate(rig: &Path, out: &Path, mode: Mode) -> Result<ExitCode, String> {
     let found = commands::calibrate(rig, mode).map_err(|error| error.to_string())?;
     commands::write_cameras(&found, out).map_err(|error| error.to_string())?;
-    print!("{}", calibrated_words(&found));
+    let _ = crate::output::say(format_args!("{}", calibrated_words(&found)));
     for remark in &found.remarks {
-        eprintln!("ravenpose: {remark}");
+        complain!("ravenpose: {remark}");
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -83,7 +83,7 @@ fn track(cameras: &Path, scene: &Path, out: &Path, mode: Mode) -> Result<ExitCod
     progress.end();
     let tracked = tracked.map_err(|error| error.to_string())?;
     commands::write_truth(&tracked, out).map_err(|error| error.to_string())?;
-    print!("{}", tracked_words(&tracked));
+    let _ = crate::output::say(format_args!("{}", tracked_words(&tracked)));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,0 +1,137 @@
+//! Has the recording the controller that the simulation has?
+//!
+//! Other gains leave no residual in torque, transmission or tip: the robot does what its torque makes it do. They show in how
+//! torque answers the tracking error. The law is learnt from the simulation, where it has to explain nearly all of the torque,
+//! and applied to what the recording's controller saw.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::linear::solve;
+use crate::motion::Motion;
+use crate::nominal::{Evaluator, mean, rms};
+use crate::problem::Problem;
+
+/// Share of the simulation's torque that its law may leave.
+const LAW: f64 = 0.1;
+/// Times that share, and share of the torque, by which the recording has to miss the law.
+const BEYOND: f64 = 4.0;
+const LEAST: f64 = 0.03;
+/// Share of what it misses that other gains may leave in the part kept aside.
+const LEFT: f64 = 0.5;
+/// Of every run, what is kept aside.
+const KEPT: f64 = 1.0 / 3.0;
+/// Error, its derivative, its integral.
+const GAINS: usize = 3;
+
+/// A joint whose torque answers its tracking error otherwise than in the simulation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Changed {
+    /// The joint.
+    pub joint: usize,
+    /// Ratio of the recording's proportional gain to the simulation's.
+    pub gain: f64,
+    /// RMS that the simulation's law misses in the part kept aside, and what other gains leave there, N·m or N.
+    pub missed: [f64; 2],
+}
+
+/// What a controller sees at the rows, and the torque that it gives.
+struct Seen {
+    columns: Vec<Vec<f64>>,
+    torque: Vec<f64>,
+    run: Vec<usize>,
+    kept: Vec<bool>,
+}
+
+/// The joint where it shows most, if any.
+pub fn changed(problem: &Problem) -> Option<Changed> {
+    let sims: Vec<&Motion> = problem.pairs.iter().filter_map(|pair| pair.sim.as_ref()).collect();
+    let reals: Vec<&Motion> = problem.pairs.iter().map(|pair| &pair.real).collect();
+    if sims.len() < reals.len() {
+        return None;
+    }
+    let all = (0..problem.robot.joint_count()).filter_map(|j| at_joint(problem, &reals, &sims, j));
+    all.max_by(|a, b| (a.missed[0] / a.missed[1]).total_cmp(&(b.missed[0] / b.missed[1])))
+}
+
+fn at_joint(problem: &Problem, reals: &[&Motion], sims: &[&Motion], j: usize) -> Option<Changed> {
+    let sim = seen(problem, sims, j)?;
+    let everything: Vec<usize> = (0..sim.columns.len()).collect();
+    let law = fit(&sim, &sim.torque, &everything, |_| true);
+    let usual = rms(without_means(&sim, &sim.torque).into_iter());
+    let left = rms(missed(&sim, &sim.torque, &everything, &law).into_iter());
+    let real = seen(problem, reals, j)?;
+    let off: Vec<f64> = missed(&real, &real.torque, &everything, &law);
+    let gains: Vec<usize> = (0..GAINS).collect();
+    let change = fit(&real, &off, &gains, |kept| !kept);
+    let after = missed(&real, &off, &gains, &change);
+    let aside = |series: &[f64]| rms(series.iter().zip(&real.kept).filter(|(_, kept)| **kept).map(|(y, _)| *y));
+    let (before, after) = (aside(&off), aside(&after));
+    let told = left <= LAW * usual && before > BEYOND * left && before > LEAST * usual && after < LEFT * before;
+    told.then(|| Changed { joint: j, gain: 1.0 + change[0] / law[0], missed: [before, after] })
+}
+
+/// None where the recording has no commands or no torque.
+fn seen(problem: &Problem, runs: &[&Motion], j: usize) -> Option<Seen> {
+    let mut evaluator = Evaluator::new(problem.robot, problem.nominal);
+    let mut out = Seen { columns: vec![Vec::new(); GAINS + 4], torque: Vec::new(), run: Vec::new(), kept: Vec::new() };
+    for (r, motion) in runs.iter().enumerate() {
+        let (command, torque) = (motion.run.command.as_ref()?, motion.torque.as_ref()?);
+        let goal = motion.window.apply(&command[j], 0);
+        let (speed, acceleration) = (motion.window.apply(&command[j], 1), motion.window.apply(&command[j], 2));
+        let mut integral = 0.0;
+        let sums: Vec<f64> = goal
+            .iter()
+            .zip(&motion.position[j])
+            .map(|(goal, q)| {
+                integral += (goal - q) * motion.run.dt_s;
+                integral
+            })
+            .collect();
+        let aside = ((1.0 - KEPT) * motion.run.len() as f64) as usize;
+        for &i in &motion.rows {
+            let load = evaluator.load(motion, i);
+            let values = [
+                goal[i] - motion.position[j][i],
+                speed[i] - motion.velocity[j][i],
+                sums[i],
+                load.link[j],
+                load.motor[j],
+                speed[i],
+                acceleration[i],
+            ];
+            out.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
+            out.torque.push(torque[j][i]);
+            out.run.push(r);
+            out.kept.push(i >= aside);
+        }
+    }
+    let finite = out.columns.iter().chain([&out.torque]).flatten().all(|x| x.is_finite());
+    (finite && out.torque.len() > 10 * out.columns.len()).then_some(out)
+}
+
+/// A series less its mean over each run: where an integral began is not known.
+fn without_means(seen: &Seen, series: &[f64]) -> Vec<f64> {
+    let runs = seen.run.last().map_or(0, |last| last + 1);
+    let means: Vec<f64> = (0..runs)
+        .map(|r| mean(&series.iter().zip(&seen.run).filter(|(_, run)| **run == r).map(|(y, _)| *y).collect::<Vec<_>>()))
+        .collect();
+    series.iter().zip(&seen.run).map(|(y, r)| y - means[*r]).collect()
+}
+
+/// Least squares of a series on some columns, all without their means.
+fn fit(seen: &Seen, series: &[f64], columns: &[usize], of: impl Fn(bool) -> bool) -> Vec<f64> {
+    let right = without_means(seen, series);
+    let own: Vec<Vec<f64>> = columns.iter().map(|c| without_means(seen, &seen.columns[*c])).collect();
+    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(&seen.kept).filter(|(_, k)| of(**k)).map(|((a, b), _)| a * b).sum::<f64>();
+    let mut gram = DMatrix::from_fn(own.len(), own.len(), |i, k| sum(&own[i], &own[k]));
+    let mut at = DVector::from_fn(own.len(), |i, _| sum(&own[i], &right));
+    solve(&mut gram, &mut at);
+    at.as_slice().to_vec()
+}
+
+/// What a law on some columns misses of a series.
+fn missed(seen: &Seen, series: &[f64], columns: &[usize], law: &[f64]) -> Vec<f64> {
+    let told = (0..series.len()).map(|i| columns.iter().zip(law).map(|(c, theta)| theta * seen.columns[*c][i]).sum::<f64>());
+    let left: Vec<f64> = series.iter().zip(told).map(|(y, p)| y - p).collect();
+    without_means(seen, &left)
+}
