@@ -96,7 +96,7 @@ fn tracked_words(tracked: &Tracked) -> String {
         }
     }
     for remark in tracked.rows.iter().flat_map(|row| &row.remarks) {
-        lines.push(format!("{remark}"));
+        lines.push(remark.clone());
     }
     if let Some(exposure_s) = tracked.exposure_s {
         lines.push(format!("exposure {:.1} ms: poses moved back to its beginning", exposure_s * 1e3));
