@@ -71,6 +71,7 @@ pub struct Motion {
     /// `A⁻¹ m - q`, smoothed.
     pub deflection: Option<Vec<Vec<f64>>>,
     slow_deflection: Option<Vec<Vec<f64>>>,
+    sign_speeds: Vec<f64>,
     /// Samples that make rows.
     pub rows: Vec<usize>,
     /// Samples with a measured tip.
@@ -111,13 +112,15 @@ impl Motion {
         });
         // A tip at every sample is thinned like the rest.
         let tip_rows = if tip_rows.len() * 2 > usable.len() { tip_rows.into_iter().step_by(step).collect() } else { tip_rows };
+        let quick_velocity: Vec<Vec<f64>> = run.drive.iter().map(|s| quick.apply(s, 1)).collect();
         Self {
             position: smooth(&run.position, 0),
             velocity: smooth(&run.position, 1),
             acceleration: smooth(&run.position, 2),
             drive_velocity: smooth(&run.drive, 1),
             drive_acceleration: smooth(&run.drive, 2),
-            quick_velocity: run.drive.iter().map(|s| quick.apply(s, 1)).collect(),
+            sign_speeds: quick_velocity.iter().map(|v| sign_speed(v)).collect(),
+            quick_velocity,
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
             slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
             deflection: deflection.as_ref().map(|d| smooth(d, 0)),
@@ -143,12 +146,21 @@ impl Motion {
     /// Speed below which the sign of the velocity is not known, rad/s or m/s: three standard deviations of the quick
     /// velocity's noise, estimated from its third differences.
     pub fn sign_speed(&self, joint: usize) -> f64 {
-        let v = &self.quick_velocity[joint];
-        let mut steps: Vec<f64> = v.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
-        steps.sort_by(f64::total_cmp);
-        let moving = v.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        (3.0 * steps.get(steps.len() / 4).copied().unwrap_or(0.0)).clamp(2e-3 * moving, 0.05 * moving + 1e-12)
+        self.sign_speeds[joint]
     }
+
+    /// Sign of a drive's velocity at a sample, as steep as its noise allows.
+    pub fn sign(&self, joint: usize, i: usize) -> f64 {
+        (self.quick_velocity[joint][i] / self.sign_speeds[joint]).tanh()
+    }
+}
+
+/// See [`Motion::sign_speed`].
+fn sign_speed(v: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = v.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    let moving = v.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    (3.0 * steps.get(steps.len() / 4).copied().unwrap_or(0.0)).clamp(2e-3 * moving, 0.05 * moving + 1e-12)
 }
 
 /// State of all joints at one instant.

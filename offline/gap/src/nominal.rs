@@ -24,6 +24,8 @@ pub struct Nominal {
     pub drives: Vec<[f64; DRIVE_COLUMNS]>,
     /// Per joint: compliance of the transmission (rad per N·m or m per N) and constant deflection.
     pub compliance: Vec<[f64; 2]>,
+    /// Per joint: friction behind the cable, viscous and dry, which loads the cable beside the link.
+    pub link_friction: Vec<[f64; 2]>,
     /// Per joint: what springs and cables pull with the first, second and third power of its position. All 0 but where the
     /// model was learnt from a recording.
     pub springs: Vec<[f64; SPRINGS]>,
@@ -53,6 +55,7 @@ impl Nominal {
             inertial,
             drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
             compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
+            link_friction: vec![[0.0; 2]; n],
             springs: vec![[0.0; SPRINGS]; n],
             usual_torque: vec![0.0; n],
             torque_error: vec![0.0; n],
@@ -127,7 +130,7 @@ impl Nominal {
                             &mut gram,
                             &mut right,
                             &row[..links],
-                            deflection[j][i] / compliance,
+                            deflection[j][i] / compliance - self.rubbing(run, j, i),
                             compliance / deflection_scale[j].max(1e-12),
                         );
                     }
@@ -197,11 +200,22 @@ impl Nominal {
         left.into_iter().map(|l| rms(l.into_iter())).collect()
     }
 
+    /// Friction behind a joint's cable at a sample.
+    fn rubbing(&self, run: &Motion, j: usize, i: usize) -> f64 {
+        let [viscous, dry] = self.link_friction[j];
+        if viscous == 0.0 && dry == 0.0 {
+            return 0.0;
+        }
+        viscous * run.velocity[j][i] + dry * run.sign(j, i)
+    }
+
     fn learn_deflection(&mut self, robot: &Robot, runs: &[Motion]) {
         let mut compliance = self.compliance.clone();
-        let mut evaluator = Evaluator::new(robot, self);
+        let before = self.clone();
+        let mut evaluator = Evaluator::new(robot, &before);
         let n = robot.joint_count();
         let (mut load, mut seen) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+        let mut rubbed = vec![[Vec::new(), Vec::new()]; n];
         for run in runs {
             let Some(deflection) = &run.deflection else { continue };
             for &i in &run.rows {
@@ -209,6 +223,8 @@ impl Nominal {
                 for j in 0..n {
                     load[j].push(at[j]);
                     seen[j].push(deflection[j][i]);
+                    rubbed[j][0].push(run.velocity[j][i]);
+                    rubbed[j][1].push(run.sign(j, i));
                 }
             }
         }
@@ -221,9 +237,41 @@ impl Nominal {
             let left = rms(x.iter().zip(y).map(|(x, y)| y - slope * x)) / rms(y.iter().copied());
             // A transmission that does not follow its load is taken for rigid.
             compliance[j] = [if left < 0.8 { slope.max(0.0) } else { 0.0 }, 0.0];
+            if let Some((slope, friction)) = with_friction(x, &rubbed[j], y).filter(|_| left < 0.8) {
+                compliance[j][0] = slope;
+                self.link_friction[j] = friction;
+            }
         }
         self.compliance = compliance;
     }
+}
+
+/// Share of the misfit of the load alone that friction behind the cable has to leave less than.
+const RUBS: f64 = 0.9;
+
+/// Compliance and friction (viscous, dry) from a deflection; none where friction explains little or would give energy.
+fn with_friction(load: &[f64], rubbed: &[Vec<f64>; 2], seen: &[f64]) -> Option<(f64, [f64; 2])> {
+    let misfit = |columns: &[&[f64]]| {
+        let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, k| dot(columns[i], columns[k]));
+        let mut at = DVector::from_fn(columns.len(), |i, _| dot(columns[i], seen));
+        solve(&mut gram, &mut at);
+        let told = |k: usize| columns.iter().zip(at.iter()).map(|(c, theta)| theta * c[k]).sum::<f64>();
+        (rms((0..seen.len()).map(|k| seen[k] - told(k))), at)
+    };
+    let (alone, _) = misfit(&[load]);
+    let tries: [&[usize]; 3] = [&[0, 1], &[0], &[1]];
+    for which in tries {
+        let columns: Vec<&[f64]> = std::iter::once(load).chain(which.iter().map(|k| &rubbed[*k][..])).collect();
+        let (left, at) = misfit(&columns);
+        if at.iter().all(|x| *x > 0.0) && left < RUBS * alone {
+            let mut friction = [0.0; 2];
+            for (k, theta) in which.iter().zip(at.iter().skip(1)) {
+                friction[*k] = theta / at[0];
+            }
+            return Some((at[0], friction));
+        }
+    }
+    None
 }
 
 /// One weighted row of a normal equation.
@@ -265,7 +313,7 @@ impl<'a> Evaluator<'a> {
         self.regressor.chunks_exact(self.nominal.inertial.len()).map(|row| dot(row, &self.nominal.inertial)).collect()
     }
 
-    /// Load and motor torque at a sample, without the nominal Coulomb friction.
+    /// Load on the cables and motor torque at a sample, without the nominal Coulomb friction.
     pub fn load(&mut self, run: &Motion, i: usize) -> Load {
         let state = run.link(i);
         let link = self.link(&state);
@@ -283,6 +331,7 @@ impl<'a> Evaluator<'a> {
         };
         let motor =
             (0..n).map(|j| link[j] + spring(j) + (0..n).map(|d| self.coupling[(d, j)] * of_drive[d]).sum::<f64>()).collect();
+        let link = link.iter().enumerate().map(|(j, x)| x + self.nominal.rubbing(run, j, i)).collect();
         Load { link, motor }
     }
 }

@@ -465,8 +465,12 @@ fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
 fn complexity(candidate: &Candidate) -> f64 {
     let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
     // What rounds a sign is not a claim of its own.
-    let rounding =
-        candidate.family.shape.iter().filter(|name| matches!(**name, "v_eps" | "presliding" | "settling" | "crossing")).count();
+    let rounding = candidate
+        .family
+        .shape
+        .iter()
+        .filter(|name| matches!(**name, "v_eps" | "presliding" | "settling" | "crossing" | "impulse"))
+        .count();
     (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
 }
 

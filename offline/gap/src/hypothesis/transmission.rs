@@ -10,6 +10,8 @@ const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.0
 const WIDTHS: [f64; 12] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// The same for the motion of another joint.
 const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
+/// Times in which the usual load carries a link across its play, to begin with, s.
+const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// Shares of the straight spring in a Bouc-Wen element.
@@ -73,6 +75,19 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         all.push(family.penalised(3.0));
     }
     let usual = size(&dictionary.load(j)).max(1e-9);
+    // A damped link takes its time from one side to the other: the impulse of its load that carries it across is the shape.
+    let impulses = CARRIED_S.map(|time| time * usual);
+    let carried = Family::shaped(
+        "backlash",
+        &[j],
+        "carried across by the load",
+        TRANSMISSION,
+        &[Bound::Positive],
+        &[("impulse", true)],
+        product(&[&impulses]),
+        move |d, s| vec![d.strain_of(j, carried(d, j, s[0]))],
+    );
+    all.push(carried.penalised(1.5));
     all.push(
         Family::shaped(
             "backlash",
@@ -86,6 +101,27 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         )
         .penalised(1.5),
     );
+}
+
+/// Where a link stands in a play of one, between -1/2 and 1/2, whose load carries it across against a damper.
+fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
+    let load = dictionary.load(j);
+    let mut out: Vec<f64> = Vec::with_capacity(load.len());
+    let mut before: Option<(usize, f64, f64)> = None;
+    for (&(r, i, _), now) in dictionary.grid.iter().zip(&load) {
+        let time_s = i as f64 * dictionary.problem.pairs[r].real.run.dt_s;
+        let place = match before.filter(|(run, ..)| *run == r) {
+            // Where a run begins it has come to rest.
+            None => 0.5 * now.signum(),
+            Some((_, since_s, last)) => {
+                let pushed = 0.5 * (last + now) * (time_s - since_s) / impulse.max(1e-12);
+                (out[out.len() - 1] + pushed).clamp(-0.5, 0.5)
+            }
+        };
+        out.push(place);
+        before = Some((r, time_s, *now));
+    }
+    out
 }
 
 /// How far the motor runs ahead of a joint with play.
