@@ -129,7 +129,7 @@ fn main() {
                     let columns = effect.chosen.candidate.columns.len();
                     let theta = &answer.fit.coefficients[start..start + columns];
                     start += columns;
-                    left.iter_mut().zip(effect.chosen.candidate.effect(c, theta)).for_each(|(y, p)| *y -= p);
+                    effect.chosen.candidate.take_off(c, theta, &mut left);
                 }
                 let floor = gap::verdicts::floor(&problem.cells[c]);
                 let before = gap::nominal::rms(problem.cells[c].residual.iter().copied());

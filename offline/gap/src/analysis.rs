@@ -12,10 +12,10 @@ use crate::hypothesis::Dictionary;
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
-use crate::problem::{Cell, Pair, Problem};
+use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, alike, as_noisy, common};
-use crate::search::{Answer, Effect, Thresholds, search};
+use crate::search::{Answer, Effect, Scored, Thresholds, search};
 use crate::{builtin, closed_loop, corrected, flexible, known, verdicts};
 
 /// One run as it was given.
@@ -298,12 +298,9 @@ fn analyse_with(
     let least = known::least(model, &problem, given, band);
     let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
     answer.effects.retain(|effect| {
-        let size = |c: usize| effect.chosen.candidate.rms(c, &effect.chosen.coefficients);
-        let main = (0..floors.len()).max_by(|a, b| {
-            let height = |c: usize| size(c) / floors[c].max(1e-300);
-            height(*a).total_cmp(&height(*b))
-        });
-        main.is_none_or(|c| size(c) >= least[c])
+        let Scored { candidate, coefficients, .. } = &effect.chosen;
+        let main = verdicts::main_cell(&floors, candidate, coefficients);
+        candidate.rms(main, coefficients) >= least[main]
     });
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
@@ -311,7 +308,9 @@ fn analyse_with(
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
-        && ceiling.cell.is_none_or(|(c, _)| left_of(&problem.cells[c], c, &answer, &estimates) >= least[c])
+        && ceiling.cell.is_none_or(|(c, _)| {
+            crate::nominal::rms(verdicts::left(&problem, c, answer.effects.iter().zip(&estimates)).into_iter()) >= least[c]
+        })
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
@@ -368,8 +367,8 @@ fn analyse_with(
 fn of_a_model(robot: &Robot, sim: &Run) -> bool {
     let motion = Motion::new(sim.clone(), Band::of(sim));
     let nominal = Nominal::learn(robot, std::slice::from_ref(&motion));
-    let shares = nominal.torque_error.iter().zip(&nominal.usual_torque).map(|(left, usual)| left / usual.max(1e-12));
-    2 * shares.filter(|share| *share > OF_A_MODEL).count() <= robot.joint_count()
+    let n = robot.joint_count();
+    2 * (0..n).filter(|j| nominal.not_understood(*j) > OF_A_MODEL).count() <= n
 }
 
 /// How far the nominal model is to be trusted.
@@ -398,15 +397,6 @@ fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceil
     let Some((c, _)) = ceiling.cell else { return true };
     let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
     !problem.from_recording || within.sqrt() > problem.practical[c]
-}
-
-/// RMS of what the effects leave of a residual.
-fn left_of(cell: &Cell, c: usize, answer: &Answer, estimates: &[Estimate]) -> f64 {
-    let mut left = cell.residual.clone();
-    for (effect, estimate) in answer.effects.iter().zip(estimates) {
-        left.iter_mut().zip(effect.chosen.candidate.effect(c, &estimate.coefficients)).for_each(|(y, p)| *y -= p);
-    }
-    crate::nominal::rms(left.into_iter())
 }
 
 fn too_short(seconds: f64) -> DataQuality {

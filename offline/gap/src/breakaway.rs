@@ -45,14 +45,14 @@ pub(crate) fn levels(robot: &Robot, run: &Run) -> Vec<DataQuality> {
 
 /// Size of the effort at each break-away.
 fn events(position: &[f64], effort: &[f64], dt_s: f64) -> Vec<f64> {
-    let (low, high) = position.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = crate::nominal::range(position.iter().copied());
     let travel = high - low;
     let rest = ((REST_S / dt_s) as usize).max(2);
     let mut all = Vec::new();
     let mut i = rest;
     while i < position.len() {
         let before = &position[i - rest..=i];
-        let (low, high) = before.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = crate::nominal::range(before.iter().copied());
         if travel <= 0.0 || high - low > STANDS * travel {
             i += 1;
             continue;

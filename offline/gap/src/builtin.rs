@@ -11,10 +11,8 @@ const REACH_S: f64 = 0.012;
 /// The run of the model: its controller along the recorded commands where both are known, else the torque that the model asks
 /// for the recorded motion. None where the recording has neither.
 pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording> {
-    let run = run(model, recording).ok()?;
-    let played = if model.controller().is_some() { closed_loop(model, &run, ClosedLoop::default()) } else { given(model, &run) };
-    let simulated = played.or_else(|_| given(model, &run)).ok()?;
-    Some(named(model, recording, &simulated))
+    let in_loop = |run: &Run| closed_loop(model, run, ClosedLoop::default()).or_else(|_| given(model, run));
+    along(model, recording, |run| if model.controller().is_some() { in_loop(run) } else { given(model, run) }).ok()
 }
 
 /// The model's controller along the recorded commands.
@@ -22,8 +20,7 @@ pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording>
 /// # Errors
 /// What keeps it from being simulated, in one line.
 pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
-    let played = run(model, recording).and_then(|run| closed_loop(model, &run, ClosedLoop::default()));
-    played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
+    along(model, recording, |run| closed_loop(model, run, ClosedLoop::default()))
 }
 
 /// The model driven by the recorded torque, started anew from the recorded state after every `window_s`.
@@ -32,8 +29,7 @@ pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recor
 /// What keeps it from being simulated, in one line.
 pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64) -> Result<Recording, String> {
     let options = OpenLoop { window_s, ..OpenLoop::default() };
-    let played = run(model, recording).and_then(|run| open_loop(model, &run, options));
-    played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
+    along(model, recording, |run| open_loop(model, run, options))
 }
 
 /// The torque that the model asks for the recorded motion, and where its joints and its tip then are.
@@ -41,7 +37,15 @@ pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64) ->
 /// # Errors
 /// What keeps it from being simulated, in one line.
 pub fn along_motion(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
-    let played = run(model, recording).and_then(|run| given(model, &run));
+    along(model, recording, |run| given(model, run))
+}
+
+fn along(
+    model: &RobotModel,
+    recording: &Recording,
+    play: impl FnOnce(&Run) -> Result<Simulated, ResimulateError>,
+) -> Result<Recording, String> {
+    let played = run(model, recording).and_then(|run| play(&run));
     played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
 }
 

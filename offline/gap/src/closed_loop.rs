@@ -67,7 +67,7 @@ pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[
         })
         .ok();
     for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
-        let of = &found.problem.cells[main_cell(found, &effect.chosen.candidate, &estimate.coefficients)];
+        let of = &found.problem.cells[main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients)];
         if let Some(played) = &in_loop {
             out.fits[k].extend(in_loop_fit(found, of, played));
         }

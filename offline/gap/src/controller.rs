@@ -4,11 +4,9 @@
 //! torque answers the tracking error. The law is learnt from the simulation, where it has to explain nearly all of the torque,
 //! and applied to what the recording's controller saw.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::linear::solve;
+use crate::linear::least_squares;
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, mean, rms};
+use crate::nominal::{Evaluator, less_means, rms};
 use crate::problem::Problem;
 
 /// Share of the simulation's torque that its law may leave.
@@ -111,22 +109,16 @@ fn seen(problem: &Problem, runs: &[&Motion], j: usize) -> Option<Seen> {
 
 /// A series less its mean over each run: where an integral began is not known.
 fn without_means(seen: &Seen, series: &[f64]) -> Vec<f64> {
-    let runs = seen.run.last().map_or(0, |last| last + 1);
-    let means: Vec<f64> = (0..runs)
-        .map(|r| mean(&series.iter().zip(&seen.run).filter(|(_, run)| **run == r).map(|(y, _)| *y).collect::<Vec<_>>()))
-        .collect();
-    series.iter().zip(&seen.run).map(|(y, r)| y - means[*r]).collect()
+    less_means(series, |k| seen.run[k])
 }
 
 /// Least squares of a series on some columns, all without their means.
 fn fit(seen: &Seen, series: &[f64], columns: &[usize], of: impl Fn(bool) -> bool) -> Vec<f64> {
-    let right = without_means(seen, series);
-    let own: Vec<Vec<f64>> = columns.iter().map(|c| without_means(seen, &seen.columns[*c])).collect();
-    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(&seen.kept).filter(|(_, k)| of(**k)).map(|((a, b), _)| a * b).sum::<f64>();
-    let mut gram = DMatrix::from_fn(own.len(), own.len(), |i, k| sum(&own[i], &own[k]));
-    let mut at = DVector::from_fn(own.len(), |i, _| sum(&own[i], &right));
-    solve(&mut gram, &mut at);
-    at.as_slice().to_vec()
+    let part = |series: &[f64]| -> Vec<f64> {
+        without_means(seen, series).into_iter().zip(&seen.kept).filter(|(_, kept)| of(**kept)).map(|(y, _)| y).collect()
+    };
+    let own: Vec<Vec<f64>> = columns.iter().map(|c| part(&seen.columns[*c])).collect();
+    least_squares(&own.iter().map(Vec::as_slice).collect::<Vec<_>>(), &part(series))
 }
 
 /// What a law on some columns misses of a series.

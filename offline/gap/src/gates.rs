@@ -98,7 +98,7 @@ fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
 fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
     (0..robot.joint_count())
         .filter_map(|j| {
-            let (low, high) = run.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            let (low, high) = crate::nominal::range(run.position[j].iter().copied());
             (high - low < 1e-4).then(|| {
                 let message = format!(
                     "{} does not move: nothing can be said of its friction or transmission; move every joint",
@@ -182,11 +182,7 @@ pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<
     }
     (0..robot.joint_count())
         .filter_map(|j| {
-            let usual = rms(sims
-                .iter()
-                .filter_map(|sim| sim.torque.as_ref().map(|t| (sim, t)))
-                .flat_map(|(sim, t)| sim.rows.iter().map(move |&i| t[j][i])));
-            let share = nominal.torque_error[j] / usual.max(1e-12);
+            let share = nominal.not_understood(j);
             (share > 0.5).then(|| {
                 let message = format!("{:.0} % of the simulated torque of {} is not understood", 100.0 * share, robot.joints[j]);
                 DataQuality::new("nominal_model", Level::Warn, message).value(100.0 * share, "%")

@@ -1,6 +1,6 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{Candidate, Column, Dictionary, Window};
+use crate::hypothesis::{Candidate, Column, Dictionary, Window, rounds};
 use crate::nominal::Nominal;
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
@@ -121,7 +121,7 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
     let mut all = Vec::new();
     for (k, step) in family.steps.iter().enumerate() {
         // What rounds a sign or a crossing is not asked for.
-        if step.is_none() || matches!(family.shape[k], "v_eps" | "presliding" | "settling" | "crossing" | "impulse") {
+        if step.is_none() || rounds(family.shape[k]) {
             continue;
         }
         let step = 1e-3 * candidate.shape[k].abs().max(1e-4);

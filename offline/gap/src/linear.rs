@@ -13,6 +13,15 @@ pub fn ridge(a: &DMatrix<f64>, b: &DVector<f64>, ridge: &[f64], prior: &DVector<
     prior + right
 }
 
+/// Coefficients of the columns whose sum comes closest to a series.
+pub fn least_squares(columns: &[&[f64]], series: &[f64]) -> Vec<f64> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, k| dot(columns[i], columns[k]));
+    let mut at = DVector::from_fn(columns.len(), |i, _| dot(columns[i], series));
+    solve(&mut gram, &mut at);
+    at.as_slice().to_vec()
+}
+
 /// Solves a symmetric positive semidefinite system in place, columns scaled to one; directions without a signature get 0.
 pub fn solve(gram: &mut DMatrix<f64>, right: &mut DVector<f64>) {
     let n = right.len();

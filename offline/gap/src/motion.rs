@@ -149,6 +149,22 @@ impl Motion {
         self.sign_speeds[joint]
     }
 
+    /// Force of bristles that bend over a travel before they slip, of their level: `z + t zd`, where t is the time in which
+    /// their vibration settles (LuGre).
+    pub fn bristle(&self, joint: usize, travel: f64, settling_s: f64) -> Vec<f64> {
+        let mut state = 0.0;
+        self.quick_velocity[joint]
+            .iter()
+            .map(|v| {
+                let moved = v * self.run.dt_s / travel;
+                // Exact for a constant direction.
+                let limit = v.signum();
+                state = if moved == 0.0 { state } else { limit + (state - limit) * (-moved.abs()).exp() };
+                state + settling_s / travel * (v - v.abs() * state)
+            })
+            .collect()
+    }
+
     /// Sign of a drive's velocity at a sample, as steep as its noise allows.
     pub fn sign(&self, joint: usize, i: usize) -> f64 {
         (self.quick_velocity[joint][i] / self.sign_speeds[joint]).tanh()

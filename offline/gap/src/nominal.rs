@@ -3,7 +3,7 @@
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
-use crate::linear::solve;
+use crate::linear::{least_squares, solve};
 use crate::motion::{Motion, State};
 use crate::robot::Robot;
 
@@ -200,6 +200,11 @@ impl Nominal {
         left.into_iter().map(|l| rms(l.into_iter())).collect()
     }
 
+    /// Share of the torque of the runs that it was learnt from which the model does not explain, of a joint.
+    pub fn not_understood(&self, joint: usize) -> f64 {
+        self.torque_error[joint] / self.usual_torque[joint].max(1e-12)
+    }
+
     /// Friction behind a joint's cable at a sample.
     fn rubbing(&self, run: &Motion, j: usize, i: usize) -> f64 {
         let [viscous, dry] = self.link_friction[j];
@@ -252,10 +257,8 @@ const RUBS: f64 = 0.9;
 /// Compliance and friction (viscous, dry) from a deflection; none where friction explains little or would give energy.
 fn with_friction(load: &[f64], rubbed: &[Vec<f64>; 2], seen: &[f64]) -> Option<(f64, [f64; 2])> {
     let misfit = |columns: &[&[f64]]| {
-        let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, k| dot(columns[i], columns[k]));
-        let mut at = DVector::from_fn(columns.len(), |i, _| dot(columns[i], seen));
-        solve(&mut gram, &mut at);
-        let told = |k: usize| columns.iter().zip(at.iter()).map(|(c, theta)| theta * c[k]).sum::<f64>();
+        let at = least_squares(columns, seen);
+        let told = |k: usize| columns.iter().zip(&at).map(|(c, theta)| theta * c[k]).sum::<f64>();
         (rms((0..seen.len()).map(|k| seen[k] - told(k))), at)
     };
     let (alone, _) = misfit(&[load]);
@@ -343,8 +346,7 @@ fn powers(q: f64) -> [f64; SPRINGS] {
 
 /// Smoothed sign of a joint's velocity.
 pub fn sign_series(run: &Motion, joint: usize) -> Vec<f64> {
-    let eps = run.sign_speed(joint);
-    let raw: Vec<f64> = run.quick_velocity[joint].iter().map(|v| (v / eps).tanh()).collect();
+    let raw: Vec<f64> = (0..run.quick_velocity[joint].len()).map(|i| run.sign(joint, i)).collect();
     run.window.apply(&raw, 0)
 }
 
@@ -357,6 +359,19 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
 /// Mean.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Least and largest.
+pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+}
+
+/// A series less its mean over each run: where it stands in a run is not known.
+pub fn less_means(series: &[f64], run_of: impl Fn(usize) -> usize) -> Vec<f64> {
+    let runs = (0..series.len()).map(&run_of).max().map_or(0, |last| last + 1);
+    let means: Vec<f64> =
+        (0..runs).map(|r| mean(&(0..series.len()).filter(|k| run_of(*k) == r).map(|k| series[k]).collect::<Vec<_>>())).collect();
+    series.iter().enumerate().map(|(k, y)| y - means[run_of(k)]).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

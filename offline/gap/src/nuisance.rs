@@ -8,7 +8,7 @@ use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
 use crate::motion::Motion;
-use crate::nominal::{rms, sign_series};
+use crate::nominal::{range, rms, sign_series};
 use crate::problem::{Channel, Problem};
 
 /// Columns of one cell, each for one standard deviation of what is believed.
@@ -173,20 +173,10 @@ const INERTIA_DRIFT: f64 = 0.1;
 /// Travel over which dry friction may turn round, shares of a joint's travel.
 const TURNING: [f64; 3] = [0.003, 0.012, 0.05];
 
-/// Sign of the motion that turns round over a share of the travel (Dahl), smoothed.
+/// Sign of the motion that turns round over a share of the travel, smoothed.
 fn turning(motion: &Motion, j: usize, share: f64) -> Vec<f64> {
-    let (low, high) = motion.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-    let travel = (share * (high - low)).max(1e-12);
-    let mut state = 0.0;
-    let raw: Vec<f64> = motion.quick_velocity[j]
-        .iter()
-        .map(|v| {
-            let limit = if *v == 0.0 { state } else { v.signum() };
-            state = limit + (state - limit) * (-(v * motion.run.dt_s / travel).abs()).exp();
-            state
-        })
-        .collect();
-    motion.window.apply(&raw, 0)
+    let (low, high) = range(motion.position[j].iter().copied());
+    motion.window.apply(&motion.bristle(j, (share * (high - low)).max(1e-12), 0.0), 0)
 }
 
 /// Nuisances of every cell of a model that was learnt from another recording: friction, constants.

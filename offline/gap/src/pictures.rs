@@ -7,7 +7,7 @@ use crate::hypothesis::Candidate;
 use crate::nominal::rms;
 use crate::problem::{Channel, Problem};
 use crate::run::Run;
-use crate::verdicts::{cell_name, cell_quantity, cell_unit, held_out, main_cell, told};
+use crate::verdicts::{cell_name, cell_quantity, cell_unit, held_out, left, main_cell, told};
 
 /// Width of a bin of the heat map, s.
 const BIN_S: f64 = 0.5;
@@ -16,7 +16,7 @@ const BIN_S: f64 = 0.5;
 pub(crate) fn draw(found: &Found, _runs: &[(Run, Option<Run>)]) -> Pictures {
     let mut pictures = Pictures { heat: heat(found), shares: shares(found), ..Pictures::default() };
     for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
-        let cell = main_cell(found, &effect.chosen.candidate, &estimate.coefficients);
+        let cell = main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients);
         pictures.signatures.push(signature(found, k, cell));
         pictures.before_after.extend(before_after(found, k as u64 + 1, cell));
     }
@@ -123,13 +123,8 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
     let own = &found.answer.effects[k].chosen.candidate;
     let (feature, x) = feature(found.problem, own, cell);
     // Only this effect: the others are taken off.
-    let mut before = of.residual.clone();
-    for (i, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
-        if i != k {
-            let other = effect.chosen.candidate.effect(cell, &estimate.coefficients);
-            before.iter_mut().zip(other).for_each(|(y, p)| *y -= p);
-        }
-    }
+    let others = found.answer.effects.iter().zip(found.estimates).enumerate().filter(|(i, _)| *i != k).map(|(_, other)| other);
+    let before = left(found.problem, cell, others);
     let effect = own.effect(cell, &found.estimates[k].coefficients);
     let after: Vec<f64> = before.iter().zip(&effect).map(|(y, p)| y - p).collect();
     let every = (x.len() / 900).max(1);
@@ -149,7 +144,7 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
 /// Mean of the fitted effect over bins of the feature.
 fn curve(x: &[f64], effect: &[f64]) -> Vec<(f64, f64)> {
     const BINS: usize = 80;
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = crate::nominal::range(x.iter().copied());
     let width = (high - low).max(1e-300) / BINS as f64;
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
     for (x, y) in x.iter().zip(effect) {

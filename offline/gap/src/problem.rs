@@ -42,9 +42,13 @@ impl Cell {
 
     /// Makes a series 0 where the cell says nothing.
     pub fn silence(&self, series: &mut [f64]) {
-        for &k in &self.silent {
-            series[k] = 0.0;
-        }
+        zero_at(series, &self.silent);
+    }
+}
+
+fn zero_at(series: &mut [f64], places: &[usize]) {
+    for &k in places {
+        series[k] = 0.0;
     }
 }
 
@@ -114,7 +118,7 @@ const STANDING_M: f64 = 0.001;
 /// Does a joint move, in some run, so that its torque says more than where it hangs?
 fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
     pairs.iter().any(|pair| {
-        let (low, high) = pair.real.position[j].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = crate::nominal::range(pair.real.position[j].iter().copied());
         high - low > if robot.prismatic[j] { STANDING_M } else { STANDING }
     })
 }
@@ -212,9 +216,7 @@ impl<'a> Problem<'a> {
             cell.rows.extend(pair.real.rows.iter().map(|&i| (r, i)));
             cell.residual.extend(residual);
         }
-        let mut residual = std::mem::take(&mut cell.residual);
-        cell.silence(&mut residual);
-        cell.residual = residual;
+        zero_at(&mut cell.residual, &cell.silent);
         self.cells.push(cell);
     }
 

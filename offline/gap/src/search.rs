@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, Window, library};
+use crate::hypothesis::{Candidate, Dictionary, Family, Window, library, rounds};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -248,7 +248,7 @@ impl Search<'_, '_> {
                 for own in all() {
                     let theta = &fit.coefficients[start..start + own.columns.len()];
                     start += theta.len();
-                    left.iter_mut().zip(own.effect(c, theta)).for_each(|(y, p)| *y -= p);
+                    own.take_off(c, theta, &mut left);
                 }
                 let left = self.problem.nuisances[c].without(&left);
                 let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
@@ -465,12 +465,7 @@ fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
 fn complexity(candidate: &Candidate) -> f64 {
     let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
     // What rounds a sign is not a claim of its own.
-    let rounding = candidate
-        .family
-        .shape
-        .iter()
-        .filter(|name| matches!(**name, "v_eps" | "presliding" | "settling" | "crossing" | "impulse"))
-        .count();
+    let rounding = candidate.family.shape.iter().filter(|name| rounds(name)).count();
     (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
 }
 

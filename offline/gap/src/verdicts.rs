@@ -13,8 +13,8 @@ use crate::analysis::{Found, Given, Options, Outcome};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
 use crate::hypothesis::{Candidate, UNMODELLED};
-use crate::intervals::Estimate;
-use crate::nominal::rms;
+use crate::intervals::{Edge, Estimate};
+use crate::nominal::{less_means, rms};
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
@@ -74,10 +74,10 @@ pub(crate) fn cell_quantity(robot: &Robot, cell: &Cell) -> String {
 }
 
 /// The cell in which an effect stands highest above the noise.
-pub(crate) fn main_cell(found: &Found, candidate: &Candidate, theta: &[f64]) -> usize {
-    (0..found.problem.cells.len())
+pub(crate) fn main_cell(floors: &[f64], candidate: &Candidate, theta: &[f64]) -> usize {
+    (0..floors.len())
         .max_by(|a, b| {
-            let height = |c: usize| candidate.rms(c, theta) / found.floors[c].max(1e-300);
+            let height = |c: usize| candidate.rms(c, theta) / floors[c].max(1e-300);
             height(*a).total_cmp(&height(*b))
         })
         .unwrap_or(0)
@@ -253,6 +253,12 @@ fn weight(best: f64, score: f64) -> f64 {
     ((score - best) / (2.0_f64).max(0.01 * best)).exp()
 }
 
+/// Weight of an effect, of its rivals and of none of them together.
+fn total_weight(effect: &Effect) -> f64 {
+    let best = effect.chosen.score;
+    weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0)
+}
+
 /// The primary verdict of an effect and its alternatives.
 fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, threshold: f64, artifact: Artifact) -> Vec<Verdict> {
     let number = k as u64 + 1;
@@ -260,7 +266,7 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let near = (0.01 * best).max(3.0);
     let named = |r: &&Scored| r.candidate.family.physics != UNMODELLED;
     let close: Vec<&Scored> = effect.rivals.iter().filter(named).filter(|r| r.score > best - near).take(4).collect();
-    let total = weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0);
+    let total = total_weight(effect);
     let probability = weight(best, best) / total;
     let candidate = &effect.chosen.candidate;
     let physics = physics(candidate);
@@ -362,7 +368,7 @@ fn site(found: &Found, candidate: &Candidate) -> Option<String> {
 }
 
 fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f64) -> Location {
-    let cell = &found.problem.cells[main_cell(found, candidate, &estimate.coefficients)];
+    let cell = &found.problem.cells[main_cell(found.floors, candidate, &estimate.coefficients)];
     let mut regime = regime::regime(candidate);
     if let Some(place) = site(found, candidate) {
         regime.condition = format!("with posture: the weight hangs at {place}");
@@ -377,11 +383,11 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
 }
 
 /// A window in a run, on the run's own clock.
-fn interval(run: &Run, window: &[Option<(f64, [f64; 2])>; 2]) -> Interval {
+fn interval(run: &Run, window: &[Option<Edge>; 2]) -> Interval {
     let (first, last) = (run.start_s.max(0.0), run.time_s(run.len() - 1).max(0.0));
-    let at = |edge: &Option<(f64, [f64; 2])>, open: f64| edge.map_or(open, |(t, _)| (run.start_s + t).clamp(first, last));
+    let at = |edge: &Option<Edge>, open: f64| edge.map_or(open, |(t, _)| (run.start_s + t).clamp(first, last));
     let mut told = Interval::new(&run.id, at(&window[0], first), at(&window[1], last));
-    let ci = |edge: &Option<(f64, [f64; 2])>| edge.map(|(_, ci)| ci.map(|t| (run.start_s + t).max(0.0)));
+    let ci = |edge: &Option<Edge>| edge.map(|(_, ci)| ci.map(|t| (run.start_s + t).max(0.0)));
     (told.start_ci95_s, told.end_ci95_s) = (ci(&window[0]), ci(&window[1]));
     told
 }
@@ -395,17 +401,12 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
     for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
         let own = &effect.chosen.candidate;
         let there = Candidate::new(found.held_dictionary, &own.family, &own.shape, own.window);
-        let predicted = there.effect(c, &estimate.coefficients);
-        after.iter_mut().zip(predicted).for_each(|(y, p)| *y -= p);
+        there.take_off(c, &estimate.coefficients, &mut after);
     }
     let nuisance = &found.held.nuisances[c];
     if found.problem.nuisances[cell].of_run.contains(&true) {
         let rows = &found.held.cells[c].rows;
-        for run in 0..found.held.pairs.len() {
-            let own = || rows.iter().enumerate().filter(|(_, row)| row.0 == run).map(|(k, _)| k);
-            let mean = own().map(|k| after[k]).sum::<f64>() / own().count().max(1) as f64;
-            own().for_each(|k| after[k] -= mean);
-        }
+        after = less_means(&after, |k| rows[k].0);
     } else if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
         after.iter_mut().zip(nuisance.predict(&found.beside[cell])).for_each(|(y, p)| *y -= p);
     }
@@ -414,15 +415,17 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
 
 /// Likeliest values of what is known only roughly beside all effects, per cell.
 pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
-    (0..problem.cells.len())
-        .map(|c| {
-            let mut left = problem.cells[c].residual.clone();
-            for (effect, estimate) in effects.iter().zip(estimates) {
-                left.iter_mut().zip(effect.chosen.candidate.effect(c, &estimate.coefficients)).for_each(|(y, p)| *y -= p);
-            }
-            problem.nuisances[c].estimate(&left)
-        })
-        .collect()
+    let left = |c: usize| left(problem, c, effects.iter().zip(estimates));
+    (0..problem.cells.len()).map(|c| problem.nuisances[c].estimate(&left(c))).collect()
+}
+
+/// What effects leave of the residual of a cell.
+pub(crate) fn left<'e>(problem: &Problem, c: usize, effects: impl Iterator<Item = (&'e Effect, &'e Estimate)>) -> Vec<f64> {
+    let mut left = problem.cells[c].residual.clone();
+    for (effect, estimate) in effects {
+        effect.chosen.candidate.take_off(c, &estimate.coefficients, &mut left);
+    }
+    left
 }
 
 /// Ids of the held-out runs.
@@ -431,7 +434,7 @@ fn held_ids(found: &Found) -> Vec<String> {
 }
 
 fn fits(found: &Found, candidate: &Candidate, theta: &[f64]) -> Vec<FitFigure> {
-    let cell = main_cell(found, candidate, theta);
+    let cell = main_cell(found.floors, candidate, theta);
     let of = &found.problem.cells[cell];
     let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
     let pair = (rms(before.into_iter()), rms(after.into_iter()));
@@ -498,12 +501,12 @@ fn another_controller(found: &Found, number: u64, changed: Changed) -> Verdict {
 /// The verdict of an effect that the vocabulary has no name for.
 fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Verdict {
     let candidate = &effect.chosen.candidate;
-    let cell = &found.problem.cells[main_cell(found, candidate, &estimate.coefficients)];
+    let cell = &found.problem.cells[main_cell(found.floors, candidate, &estimate.coefficients)];
     let regime = Regime::new(Feature::All, format!("depends on {}", candidate.family.form));
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), Subsystem::Unknown, regime);
     location.energy_share = Some(effect.share.clamp(0.0, 1.0));
     let best = effect.chosen.score;
-    let total = weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0);
+    let total = total_weight(effect);
     let claim = format!("a term in {} explains more than every physics that has a name", candidate.family.form);
     let evidence =
         Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);

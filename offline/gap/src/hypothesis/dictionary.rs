@@ -131,7 +131,7 @@ impl<'a> Dictionary<'a> {
     /// Distance between the ends of a joint's motion, rad or m.
     pub fn travel(&self, j: usize) -> f64 {
         let q = self.at_grid(|r, i, _| self.problem.pairs[r].real.position[j][i]);
-        let (low, high) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = crate::nominal::range(q.iter().copied());
         (high - low).max(1e-9)
     }
 

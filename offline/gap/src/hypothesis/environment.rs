@@ -47,7 +47,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     );
     for (k, normal) in normals().into_iter().enumerate() {
         let along = tips.positions.iter().map(|tip| tip.dot(&normal));
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) = crate::nominal::range(along);
         let walls = WALLS.map(|share| low + share * (high - low));
         let tips = tips.clone();
         all.push(

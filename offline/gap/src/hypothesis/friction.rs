@@ -4,10 +4,10 @@ use super::dictionary::{Dictionary, size, times};
 use super::{Bound, Family, product};
 use crate::problem::Channel;
 
-/// Travel over which friction turns round, as shares of a joint's usual travel; 0: with the sign of the velocity alone.
-/// Below break-away a bristle keeps its force, which a rigid sign does not: a joint at rest holds what it came with.
-const PRESLIDING: [f64; 4] = [0.0, 0.0005, 0.003, 0.015];
-/// A sign of the motion with the number that rounds it.
+/// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
+/// a rigid sign does not: a joint at rest holds what it came with.
+const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
+/// A sign of the motion with the numbers that round it.
 type Turn = fn(&Dictionary, usize, &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
@@ -16,9 +16,9 @@ const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
 /// Exponents of the Stribeck curve.
 const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
-/// Time constants of heating, s.
-/// First guess of the time in which a bristle settles.
+/// First guess of the time in which a bristle settles, s.
 const SETTLING_S: [f64; 1] = [0.004];
+/// Time constants of heating, s.
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
@@ -50,29 +50,12 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     };
     let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
-    all.push(Family::shaped(
-        "coulomb_friction",
-        &[j],
-        form,
-        TORQUE,
-        &[Bound::Positive],
-        &[("v_eps", true)],
-        product(&[&slowest]),
-        move |d, s| vec![d.effort_of(j, sign_below(d, j, s), at_link)],
-    ));
-    all.push(Family::shaped(
-        "coulomb_friction",
-        &[j],
-        form,
-        TORQUE,
-        &[Bound::Positive],
-        &[("presliding", true), ("settling", true)],
-        product(&[&travels[1..], &SETTLING_S]),
-        move |d, s| vec![d.effort_of(j, turning(d, j, s), at_link)],
-    ));
     let by_speed = (&[("v_eps", true)][..], product(&[&slowest]), sign_below as Turn);
-    let by_travel = (&[("presliding", true), ("settling", true)][..], product(&[&travels[1..], &SETTLING_S]), turning as Turn);
+    let by_travel = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), turning as Turn);
     for (names, starts, sign) in [by_speed, by_travel] {
+        all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
+            vec![d.effort_of(j, sign(d, j, s), at_link)]
+        }));
         all.push(
             Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
                 vec![by_load(d, &sign(d, j, s))]
@@ -143,20 +126,7 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
 /// of such bristles settles (LuGre: `z + t zd`).
 fn turning(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
     let (travel, settling_s) = (shape[0].max(1e-12), shape[1]);
-    dictionary.smoothed(|r| {
-        let motion = &dictionary.problem.pairs[r].real;
-        let mut state = 0.0;
-        motion.quick_velocity[j]
-            .iter()
-            .map(|v| {
-                let moved = v * motion.run.dt_s / travel;
-                // Exact for a constant direction.
-                let limit = v.signum();
-                state = if moved == 0.0 { state } else { limit + (state - limit) * (-moved.abs()).exp() };
-                state + settling_s / travel * (v - v.abs() * state)
-            })
-            .collect()
-    })
+    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.bristle(j, travel, settling_s))
 }
 
 /// Sign of the velocity as steep as its noise allows, smoothed.

@@ -204,6 +204,11 @@ impl Candidate {
         sum
     }
 
+    /// Takes the effect in a cell off a series.
+    pub fn take_off(&self, cell: usize, coefficients: &[f64], series: &mut [f64]) {
+        series.iter_mut().zip(self.effect(cell, coefficients)).for_each(|(y, p)| *y -= p);
+    }
+
     /// RMS of the effect in a cell for given coefficients.
     pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
         crate::nominal::rms(self.effect(cell, coefficients).into_iter())
@@ -238,6 +243,16 @@ pub fn library(dictionary: &Dictionary) -> Vec<Arc<Family>> {
         }
     }
     all.into_iter().map(Arc::new).collect()
+}
+
+/// Does a number of a shape only round a sign or a crossing? It is no claim of its own, and nobody asks for it.
+pub(crate) fn rounds(name: &str) -> bool {
+    matches!(name, "v_eps" | "presliding" | "settling" | "crossing" | "impulse")
+}
+
+/// So many numbers from one to another, each the same times the one before.
+fn geometric(from: f64, to: f64, count: usize) -> Vec<f64> {
+    (0..count).map(|k| from * (to / from).powf(k as f64 / (count - 1) as f64)).collect()
 }
 
 /// All combinations of the axes of a grid.

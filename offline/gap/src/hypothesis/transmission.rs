@@ -1,7 +1,7 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
 use super::dictionary::{Dictionary, minus, size};
-use super::{Bound, Column, Family, product};
+use super::{Bound, Column, Family, geometric, product};
 use crate::problem::Channel;
 
 /// Widths of play, shares of a joint's travel.
@@ -349,7 +349,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     // A bend in points that a camera saw is mostly play or the camera.
     let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
     let (from, to, count) = PERIODS;
-    let periods: Vec<f64> = (0..count).map(|k| travel * from * (to / from).powf(k as f64 / (count - 1) as f64)).collect();
+    let periods = geometric(travel * from, travel * to, count);
     all.push(
         Family::shaped(
             "pulley_eccentricity",

@@ -2,15 +2,15 @@
 //! taken for what it is not: where one of them wins, the answer is `unmodelled`, with what it depends on.
 
 use super::dictionary::{Dictionary, times};
-use super::{Bound, Family, product};
+use super::{Bound, Family, geometric, product};
 use crate::problem::Channel;
 
 /// Their name in the vocabulary.
 pub const UNMODELLED: &str = "unmodelled";
 /// Share of the largest load beyond which a cable is softer, to begin with.
 const SLACK: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
-/// Periods of a wave over the travel.
-const WAVES: usize = 24;
+/// Periods of a wave, shares of the travel: from, to, how many.
+const WAVES: (f64, f64, usize) = (0.08, 2.0, 24);
 /// How much harder a hardening cable is at its largest load, to begin with.
 const HARDER: [f64; 3] = [0.5, 4.0, 30.0];
 /// Most steps of a position, and the part of a run that has to lie between two of them.
@@ -52,7 +52,8 @@ fn push_friction(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         vec![wave(0.0), wave(std::f64::consts::FRAC_PI_2)]
     };
     let (travel, free) = (dictionary.travel(j), Bound::Free);
-    let periods: Vec<f64> = (0..WAVES).map(|k| travel * 0.08 * 25.0_f64.powf(k as f64 / (WAVES - 1) as f64)).collect();
+    let (from, to, count) = WAVES;
+    let periods = geometric(travel * from, travel * to, count);
     let period = [("period", true)];
     let family =
         Family::shaped(UNMODELLED, &[j], "friction and position", TORQUE, &[free, free], &period, product(&[&periods]), waves);
