@@ -1,39 +1,14 @@
 //! `ravenpose infer` as a user runs it: golden outputs of every reference model, hostile files, bad tables.
 
+mod common;
+
+use common::{Folder, errors, shared};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-fn shared(sub: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("RAVENPOSE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
-    let path = root.join(sub);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {} is absent", path.display());
-    None
-}
-
 fn untrained() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/untrained.onnx")
-}
-
-struct Temp(PathBuf);
-
-impl Temp {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ravenpose-infer-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).expect("temporary directory");
-        Self(path)
-    }
-}
-
-impl Drop for Temp {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// Runs under a limit of 1 GiB of memory.
@@ -66,7 +41,7 @@ fn columns(path: &Path, names: [&str; 3]) -> Vec<[f64; 3]> {
 #[test]
 fn golden_outputs_of_every_reference_model() {
     let Some(models) = shared("models") else { return };
-    let temp = Temp::new("golden");
+    let folder = Folder::new("golden");
     for (model, golden, tolerance) in [
         ("l654_sigmoid_bn", "golden.csv", 2e-5),
         ("l654_sigmoid_folded", "golden/l654_sigmoid_folded.csv", 2e-5),
@@ -75,9 +50,9 @@ fn golden_outputs_of_every_reference_model() {
         ("l654_sigmoid_postbn", "golden/l654_sigmoid_postbn.csv", 2e-5),
         ("l6654_elu_postbn", "golden/l6654_elu_postbn.csv", 3e-4),
     ] {
-        let out = temp.0.join("out.csv");
+        let out = folder.file("out.csv");
         let done = infer(&models.join(format!("{model}.onnx")), &models.join(golden), &out);
-        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        assert_eq!(done.status.code(), Some(0), "{}", errors(&done));
         let truth = columns(&models.join(golden), ["f64_0", "f64_1", "f64_2"]);
         let found = columns(&out, ["out_0", "out_1", "out_2"]);
         assert_eq!(found.len(), truth.len());
@@ -90,10 +65,10 @@ fn golden_outputs_of_every_reference_model() {
 #[test]
 fn hostile_models_are_refused_in_one_line_within_a_second_and_a_gibibyte() {
     let Some(bad) = shared("models/bad") else { return };
-    let temp = Temp::new("bad");
+    let folder = Folder::new("bad");
     let row: Vec<String> = (0..118).map(|_| "0.5".to_owned()).collect();
     let header: Vec<String> = (0..118).map(|input| format!("in_{input}")).collect();
-    let input = temp.0.join("in.csv");
+    let input = folder.file("in.csv");
     std::fs::write(&input, format!("{}\n{}\n", header.join(","), row.join(","))).expect("table");
     let mut seen = 0;
     for entry in std::fs::read_dir(bad).expect("folder") {
@@ -103,11 +78,11 @@ fn hostile_models_are_refused_in_one_line_within_a_second_and_a_gibibyte() {
         }
         seen += 1;
         let name = model.file_name().expect("name").to_string_lossy().into_owned();
-        let out = temp.0.join("out.csv");
+        let out = folder.file("out.csv");
         let begun = Instant::now();
         let done = infer(&model, &input, &out);
         assert!(begun.elapsed() < Duration::from_secs(5), "{name} took {:?}", begun.elapsed());
-        let words = String::from_utf8_lossy(&done.stderr);
+        let words = errors(&done);
         if ["ok_small.onnx", "dynamic_batch_ok.onnx"].contains(&name.as_str()) {
             assert_eq!(done.status.code(), Some(0), "{name}: {words}");
             std::fs::remove_file(&out).expect("output");
@@ -130,9 +105,9 @@ fn bad_tables_are_refused_by_line_and_column_and_leave_nothing() {
         row[at] = text;
         format!("{}\n{}\n{}\n", header.join(","), vec!["1"; 118].join(","), row.join(","))
     };
-    let temp = Temp::new("tables");
-    let input = temp.0.join("in.csv");
-    let out = temp.0.join("out.csv");
+    let folder = Folder::new("tables");
+    let input = folder.file("in.csv");
+    let out = folder.file("out.csv");
     for (text, expected) in [
         (with(7, "NaN"), "in.csv:3: in_7 is NaN"),
         (with(117, "inf"), "in.csv:3: in_117 is inf"),
@@ -146,21 +121,21 @@ fn bad_tables_are_refused_by_line_and_column_and_leave_nothing() {
     ] {
         std::fs::write(&input, text).expect("table");
         let done = infer(&untrained(), &input, &out);
-        let words = String::from_utf8_lossy(&done.stderr);
+        let words = errors(&done);
         assert_eq!(done.status.code(), Some(2), "{words}");
         assert!(words.contains(expected) && words.lines().count() == 1, "wanted {expected}, got {words}");
-        assert_eq!(std::fs::read_dir(&temp.0).expect("folder").count(), 1, "nothing but the input is left");
+        assert_eq!(std::fs::read_dir(folder.file("")).expect("folder").count(), 1, "nothing but the input is left");
     }
-    let done = infer(&untrained(), &temp.0.join("absent.csv"), &out);
+    let done = infer(&untrained(), &folder.file("absent.csv"), &out);
     assert_eq!(done.status.code(), Some(2));
 }
 
 #[test]
 fn other_columns_are_ignored_and_the_order_of_columns_does_not_matter() {
-    let temp = Temp::new("order");
+    let folder = Folder::new("order");
     let value = |input: usize| format!("{}", (input as f64 * 0.37).sin() * 0.5);
-    let plain = temp.0.join("plain.csv");
-    let mixed = temp.0.join("mixed.csv");
+    let plain = folder.file("plain.csv");
+    let mixed = folder.file("mixed.csv");
     let names: Vec<String> = (0..118).map(|input| format!("in_{input}")).collect();
     let values: Vec<String> = (0..118).map(value).collect();
     std::fs::write(&plain, format!("{}\n{}\n", names.join(","), values.join(","))).expect("table");
@@ -169,9 +144,9 @@ fn other_columns_are_ignored_and_the_order_of_columns_does_not_matter() {
     let outputs: Vec<String> = [&plain, &mixed]
         .into_iter()
         .map(|input| {
-            let out = temp.0.join("out.csv");
+            let out = folder.file("out.csv");
             let done = infer(&untrained(), input, &out);
-            assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+            assert_eq!(done.status.code(), Some(0), "{}", errors(&done));
             std::fs::read_to_string(&out).expect("output")
         })
         .collect();

@@ -1,51 +1,16 @@
 //! `ravenpose simulate`, `info`, `convert`, `plot` as a user runs them.
 #![allow(missing_docs)]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
-fn ravenpose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_ravenpose")).args(arguments).output().expect("ravenpose runs")
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
-
-/// A folder of our own, gone at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ravenpose-cli-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).expect("folder");
-        Self(path)
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use common::{Folder, done, errors, ravenpose, refused, text, with_effect};
+use std::path::Path;
+use std::process::Output;
 
 fn simulate(out: &Path, more: &[&str]) -> Output {
     let mut arguments = vec!["simulate", "--minutes", "0.05", "--seed", "7", "--robot", "raven2-worn", "--out", text(out)];
     arguments.extend(more);
     ravenpose(&arguments)
-}
-
-/// One line on standard error, exit status 2, and these words in it.
-fn refused(output: &Output, words: &str) {
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
-    assert!(error.contains(words), "{error}");
 }
 
 #[test]
@@ -54,7 +19,7 @@ fn runs_are_the_same_bytes_whatever_the_number_of_threads() {
     let (one, two) = (folder.file("one"), folder.file("two"));
     for (out, threads) in [(&one, "1"), (&two, "3")] {
         let output = simulate(out, &["--run-minutes", "0.0125", "--arm", "both", "--threads", threads]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", errors(&output));
     }
     let mut names: Vec<_> = std::fs::read_dir(&one).expect("runs").map(|entry| entry.expect("entry").file_name()).collect();
     names.sort();
@@ -74,31 +39,30 @@ fn a_simulated_run_has_every_state_and_its_truth_and_converts_to_everything() {
     let shown = info[0].to_string();
     assert!(shown.contains("MCAP") && shown.contains("3000"), "{shown}");
     let table = folder.file("run.csv");
-    assert!(ravenpose(&["convert", text(&run), text(&table)]).status.success());
+    done(&["convert", text(&run), text(&table)]);
     let lines = std::fs::read_to_string(&table).expect("table");
     let header = lines.lines().find(|line| !line.starts_with('#')).expect("header");
     assert!(header.starts_with("t_s,") && header.contains("mpos_1_rad") && header.contains("truth_x_mm"), "{header}");
     assert_eq!(lines.lines().filter(|line| !line.starts_with('#')).count(), 3001);
     // There and back again through every format that keeps all: the same bytes of MCAP.
     let first = folder.file("first.mcap");
-    assert!(ravenpose(&["convert", text(&run), text(&first)]).status.success());
+    done(&["convert", text(&run), text(&first)]);
     for ending in ["bag", "parquet"] {
         let (other, back) = (folder.file(&format!("other.{ending}")), folder.file(&format!("back-{ending}.mcap")));
-        assert!(ravenpose(&["convert", text(&run), text(&other)]).status.success(), "{ending}");
-        assert!(ravenpose(&["convert", text(&other), text(&back)]).status.success(), "{ending}");
+        done(&["convert", text(&run), text(&other)]);
+        done(&["convert", text(&other), text(&back)]);
         let (a, b) = (folder.file(&format!("a-{ending}.csv")), folder.file(&format!("b-{ending}.csv")));
-        assert!(ravenpose(&["convert", text(&first), text(&a)]).status.success());
-        assert!(ravenpose(&["convert", text(&back), text(&b)]).status.success());
+        done(&["convert", text(&first), text(&a)]);
+        done(&["convert", text(&back), text(&b)]);
         assert_eq!(std::fs::read(&a).expect("a"), std::fs::read(&b).expect("b"), "{ending}");
     }
     for ending in ["rvs", "txt", "252.csv", "csv.gz"] {
         let other = folder.file(&format!("other.{ending}"));
-        let output = ravenpose(&["convert", text(&run), text(&other)]);
-        assert!(output.status.success(), "{ending}: {}", String::from_utf8_lossy(&output.stderr));
-        assert!(ravenpose(&["info", text(&other)]).status.success(), "{ending}");
+        done(&["convert", text(&run), text(&other)]);
+        done(&["info", text(&other)]);
     }
     let page = folder.file("run.html");
-    assert!(ravenpose(&["plot", text(&run), "--out", text(&page)]).status.success());
+    done(&["plot", text(&run), "--out", text(&page)]);
     let page = std::fs::read_to_string(&page).expect("page");
     assert!(page.contains("<svg") && page.len() > 20_000 && !page.contains("<script src"), "{} bytes", page.len());
 }
@@ -109,8 +73,7 @@ fn pairs_of_a_simulated_run_are_its_error() {
     let out = folder.file("runs");
     assert!(simulate(&out, &[]).status.success());
     let table = folder.file("pairs.csv");
-    let output = ravenpose(&["pair", text(&out.join("run_0001.mcap")), "--same", "--out", text(&table)]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    done(&["pair", text(&out.join("run_0001.mcap")), "--same", "--out", text(&table)]);
     let lines = std::fs::read_to_string(&table).expect("pairs");
     let rows: Vec<Vec<f64>> = lines
         .lines()
@@ -136,11 +99,10 @@ fn a_cut_recording_gives_what_stands_before_the_cut_and_says_where() {
     let out = folder.file("runs");
     assert!(simulate(&out, &[]).status.success());
     let whole = std::fs::read(out.join("run_0001.mcap")).expect("run");
-    let cut = folder.file("cut.mcap");
-    std::fs::write(&cut, &whole[..whole.len() * 2 / 3]).expect("cut");
+    let cut = folder.write("cut.mcap", &whole[..whole.len() * 2 / 3]);
     let saved = folder.file("saved.csv");
     let output = ravenpose(&["convert", text(&cut), text(&saved)]);
-    let error = String::from_utf8_lossy(&output.stderr);
+    let error = errors(&output);
     assert_eq!(output.status.code(), Some(1), "{error}");
     assert!(error.lines().count() == 1 && error.contains("cut.mcap: byte "), "{error}");
     let rows = std::fs::read_to_string(&saved).expect("saved").lines().filter(|line| !line.starts_with('#')).count();
@@ -149,12 +111,13 @@ fn a_cut_recording_gives_what_stands_before_the_cut_and_says_where() {
 
 #[test]
 fn every_recording_beside_the_repository_is_described_and_converted() {
-    let data = std::env::var_os("RAVENPOSE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
-    if !data.exists() {
-        println!("skipped: {} is absent", data.display());
-        return;
-    }
+    let data = match std::env::var_os("RAVENPOSE_DATA") {
+        Some(data) => data.into(),
+        None => match common::shared("data") {
+            Some(data) => data,
+            None => return,
+        },
+    };
     let folder = Folder::new("shared");
     let mut files = Vec::new();
     let mut folders = vec![data];
@@ -171,11 +134,9 @@ fn every_recording_beside_the_repository_is_described_and_converted() {
     }
     assert!(files.len() > 60, "{} files", files.len());
     for file in files {
-        let info = ravenpose(&["info", text(&file)]);
-        assert!(info.status.success(), "{}: {}", file.display(), String::from_utf8_lossy(&info.stderr));
+        done(&["info", text(&file)]);
         let out = folder.file("out.parquet");
-        let convert = ravenpose(&["convert", text(&file), text(&out)]);
-        assert!(convert.status.success(), "{}: {}", file.display(), String::from_utf8_lossy(&convert.stderr));
+        done(&["convert", text(&file), text(&out)]);
         std::fs::remove_file(&out).expect("written");
     }
 }
@@ -183,30 +144,26 @@ fn every_recording_beside_the_repository_is_described_and_converted() {
 #[test]
 fn bad_input_gets_one_line_and_nothing_is_left() {
     let folder = Folder::new("bad");
-    refused(&ravenpose(&["info", text(&folder.file("absent.mcap"))]), "absent.mcap");
-    let garbage = folder.file("garbage.mcap");
-    std::fs::write(&garbage, [7_u8; 5000]).expect("garbage");
-    refused(&ravenpose(&["info", text(&garbage)]), "garbage.mcap");
+    refused(&ravenpose(&["info", text(&folder.file("absent.mcap"))]), &["absent.mcap"]);
+    let garbage = folder.write("garbage.mcap", [7_u8; 5000]);
+    refused(&ravenpose(&["info", text(&garbage)]), &["garbage.mcap"]);
     let out = folder.file("out.mcap");
-    refused(&ravenpose(&["convert", text(&garbage), text(&out)]), "garbage.mcap");
+    refused(&ravenpose(&["convert", text(&garbage), text(&out)]), &["garbage.mcap"]);
     assert!(!out.exists());
-    let table = folder.file("table.csv");
-    std::fs::write(&table, "t_s,mpos_1_rad\n0,1\n0.001,2\n").expect("table");
-    refused(&ravenpose(&["convert", text(&table), text(&folder.file("out.xyz"))]), "no format has this ending");
-    refused(&ravenpose(&["convert", text(&table), text(&table)]), "both input and output");
-    refused(&simulate(&folder.file("runs"), &["--run-minutes", "0"]), "--run-minutes 0");
+    let table = folder.write("table.csv", "t_s,mpos_1_rad\n0,1\n0.001,2\n");
+    refused(&ravenpose(&["convert", text(&table), text(&folder.file("out.xyz"))]), &["no format has this ending"]);
+    refused(&ravenpose(&["convert", text(&table), text(&table)]), &["both input and output"]);
+    refused(&simulate(&folder.file("runs"), &["--run-minutes", "0"]), &["--run-minutes 0"]);
     refused(
         &ravenpose(&["simulate", "--minutes", "1", "--seed", "1", "--robot", "nowhere.toml", "--out", text(&folder.file("r"))]),
-        "nowhere.toml",
+        &["nowhere.toml"],
     );
-    let robot = folder.file("robot.toml");
-    let robot_text = "schema = \"ravenpose-robot/1\"\nname = \"x\"\nbase = \"raven2-nominal\"\n[[effect]]\nphysics = \"cable_creep\"\njoint = 5\nparameters = { J_k = 1e-4, T_k = 10 }\n";
-    std::fs::write(&robot, robot_text).expect("robot");
-    let robot = text(&robot).to_owned();
+    let effect = "physics = \"cable_creep\"\njoint = 5\nparameters = { J_k = 1e-4, T_k = 10 }";
+    let robot = folder.write("robot.toml", with_effect(effect));
     let runs = folder.file("creep");
     refused(
-        &ravenpose(&["simulate", "--minutes", "0.01", "--seed", "1", "--robot", &robot, "--out", text(&runs)]),
-        "cable_creep on joint 5",
+        &ravenpose(&["simulate", "--minutes", "0.01", "--seed", "1", "--robot", text(&robot), "--out", text(&runs)]),
+        &["cable_creep on joint 5"],
     );
     assert_eq!(std::fs::read_dir(&runs).map_or(0, Iterator::count), 0);
 }
@@ -217,6 +174,6 @@ fn a_second_simulation_does_not_overwrite_the_first() {
     let out = folder.file("runs");
     assert!(simulate(&out, &[]).status.success());
     let before = std::fs::read(out.join("run_0001.mcap")).expect("run");
-    refused(&simulate(&out, &["--arm", "green"]), "is there already");
+    refused(&simulate(&out, &["--arm", "green"]), &["is there already"]);
     assert_eq!(std::fs::read(out.join("run_0001.mcap")).expect("run"), before);
 }

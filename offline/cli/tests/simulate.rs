@@ -1,10 +1,12 @@
 //! `ravenpose simulate` with arms that are no RAVEN-II, and along the commands of recordings.
 #![allow(missing_docs)]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
+use common::{Folder, done, ravenpose, text};
 use recordings::{Recording, csv};
+use std::path::PathBuf;
+use std::process::Output;
 
 const ARM: &str = r#"<robot name="pair">
   <link name="base"/>
@@ -25,58 +27,37 @@ const ARM: &str = r#"<robot name="pair">
 </robot>
 "#;
 
-fn ravenpose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_ravenpose")).args(arguments).output().expect("ravenpose runs")
-}
+/// A folder with the arm in it.
+struct Bench(Folder);
 
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
-
-/// A folder of our own, gone at the end.
-struct Folder(PathBuf);
-
-impl Folder {
+impl Bench {
     fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ravenpose-simulate-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).expect("folder");
-        std::fs::write(path.join("arm.urdf"), ARM).expect("URDF");
-        Self(path)
+        let folder = Folder::new(name);
+        folder.write("arm.urdf", ARM);
+        Self(folder)
     }
 
     fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
+        self.0.file(name)
     }
 
     fn simulate(&self, robot: &str, out: &str, more: &[&str]) -> Output {
         let (robot, out) = (self.file(robot), self.file(out));
-        let mut arguments = vec!["simulate", "--robot", text(&robot), "--out", text(&out)];
-        arguments.extend(more);
-        ravenpose(&arguments)
+        ravenpose(&[&["simulate", "--robot", text(&robot), "--out", text(&out)], more].concat())
+    }
+
+    fn simulated(&self, robot: &str, out: &str, more: &[&str]) {
+        let output = self.simulate(robot, out, more);
+        assert!(output.status.success(), "{}", common::errors(&output));
+    }
+
+    fn refuses(&self, robot: &str, more: &[&str], words: &str) {
+        common::refused(&self.simulate(robot, "x", more), &[words]);
     }
 
     fn run(&self, out: &str) -> Recording {
         csv::read(&self.file(out).join("run_0001.csv")).expect("a run")
     }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-fn good(output: &Output) {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-}
-
-/// One line on standard error, exit status 2, and these words in it.
-fn refused(output: &Output, words: &str) {
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
-    assert!(error.contains(words), "{error}");
 }
 
 /// Largest difference of a column of two runs.
@@ -88,10 +69,10 @@ fn off(a: &Recording, b: &Recording, column: &str) -> f64 {
 
 #[test]
 fn any_arm_gives_tidy_runs_with_its_own_joints_and_units() {
-    let folder = Folder::new("any");
+    let folder = Bench::new("any");
     let plan = ["--minutes", "0.1", "--run-minutes", "0.05", "--seed", "2"];
-    good(&folder.simulate("arm.urdf", "one", &[&plan[..], &["--threads", "1"]].concat()));
-    good(&folder.simulate("arm.urdf", "two", &[&plan[..], &["--threads", "2"]].concat()));
+    folder.simulated("arm.urdf", "one", &[&plan[..], &["--threads", "1"]].concat());
+    folder.simulated("arm.urdf", "two", &[&plan[..], &["--threads", "2"]].concat());
     for name in ["run_0001.csv", "run_0002.csv", "simulation.txt"] {
         let read = |out: &str| std::fs::read(folder.file(out).join(name)).expect(name);
         assert_eq!(read("one"), read("two"), "{name}");
@@ -111,10 +92,10 @@ fn any_arm_gives_tidy_runs_with_its_own_joints_and_units() {
 
 #[test]
 fn a_corrected_robot_follows_the_commands_of_a_recording() {
-    let folder = Folder::new("commands");
-    good(&folder.simulate("arm.urdf", "first", &["--minutes", "0.05", "--seed", "4"]));
+    let folder = Bench::new("commands");
+    folder.simulated("arm.urdf", "first", &["--minutes", "0.05", "--seed", "4"]);
     let recorded = folder.file("first").join("run_0001.csv");
-    good(&folder.simulate("arm.urdf", "again", &["--commands", text(&recorded)]));
+    folder.simulated("arm.urdf", "again", &["--commands", text(&recorded)]);
     let (first, again) = (folder.run("first"), folder.run("again"));
     assert_eq!(first.time_s(), again.time_s());
     for column in ["mpos_1_rad", "jpos_2_rad", "truth_x_m"] {
@@ -123,8 +104,8 @@ fn a_corrected_robot_follows_the_commands_of_a_recording() {
     let effect = "[[effect]]\nphysics = \"backlash\"\njoint = \"swing\"\nparameters = { b = 0.02 }\n\
                   [[effect]]\nphysics = \"coulomb_friction\"\njoint = \"lift\"\nparameters = { f_c = 5.0 }\n";
     let file = format!("schema = \"ravenpose-robot/1\"\nname = \"worn\"\nbase = \"urdf\"\nurdf = \"arm.urdf\"\n{effect}");
-    std::fs::write(folder.file("worn.toml"), file).expect("robot");
-    good(&folder.simulate("worn.toml", "worn", &["--commands", text(&recorded), text(&recorded)]));
+    folder.0.write("worn.toml", file);
+    folder.simulated("worn.toml", "worn", &["--commands", text(&recorded), text(&recorded)]);
     assert!(folder.file("worn").join("run_0002.csv").exists());
     let worn = folder.run("worn");
     assert!(off(&first, &worn, "truth_jpos_2_rad") > 5e-3);
@@ -135,12 +116,12 @@ fn a_corrected_robot_follows_the_commands_of_a_recording() {
 fn a_raven_follows_commands_as_states() {
     let folder = Folder::new("raven");
     let out = folder.file("first");
-    good(&ravenpose(&["simulate", "--minutes", "0.02", "--seed", "5", "--out", text(&out)]));
+    done(&["simulate", "--minutes", "0.02", "--seed", "5", "--out", text(&out)]);
     let (recorded, again) = (out.join("run_0001.mcap"), folder.file("again"));
-    good(&ravenpose(&["simulate", "--commands", text(&recorded), "--out", text(&again)]));
+    done(&["simulate", "--commands", text(&recorded), "--out", text(&again)]);
     let (a, b) = (folder.file("a.csv"), folder.file("b.csv"));
-    good(&ravenpose(&["convert", text(&recorded), text(&a)]));
-    good(&ravenpose(&["convert", text(&again.join("run_0001.mcap")), text(&b)]));
+    done(&["convert", text(&recorded), text(&a)]);
+    done(&["convert", text(&again.join("run_0001.mcap")), text(&b)]);
     let (a, b) = (csv::read(&a).expect("a"), csv::read(&b).expect("b"));
     assert_eq!(a.rows(), b.rows());
     for (column, most) in [("jpos_d_1_rad", 1e-6), ("jpos_1_rad", 2e-4), ("jpos_3_m", 1e-4), ("truth_x_m", 2e-4)] {
@@ -150,18 +131,20 @@ fn a_raven_follows_commands_as_states() {
 
 #[test]
 fn what_is_for_another_robot_is_refused() {
-    let folder = Folder::new("refused");
+    let folder = Bench::new("refused");
     let plan = ["--minutes", "0.01", "--seed", "1"];
     let with = |more: &[&'static str]| -> Vec<&'static str> { [&plan[..], more].concat() };
-    refused(&folder.simulate("arm.urdf", "x", &with(&["--format", "mcap"])), "RAVEN-II only");
-    refused(&folder.simulate("arm.urdf", "x", &with(&["--arm", "green"])), "has one arm");
-    refused(&folder.simulate("arm.urdf", "x", &with(&["--motion", "zigzag"])), "is for RAVEN-II");
-    refused(&folder.simulate("none.urdf", "x", &plan), "none.urdf: cannot be read");
-    std::fs::write(folder.file("bad.urdf"), ARM.replace("upper=\"1\"", "upper=\"one\"")).expect("URDF");
-    refused(&folder.simulate("bad.urdf", "x", &plan), "bad.urdf: URDF line 8, joint swing");
-    std::fs::write(folder.file("table.csv"), "t_s,mpos_1_rad,mpos_2_rad\n0,1,2\n0.001,1,2\n").expect("table");
-    let table = folder.file("table.csv");
-    refused(&folder.simulate("arm.urdf", "x", &["--commands", text(&table)]), "has no column jpos_d_1_m");
-    refused(&ravenpose(&["simulate", "--commands", text(&table), "--arm", "both", "--out", text(&folder.file("x"))]), "--arm both");
+    folder.refuses("arm.urdf", &with(&["--format", "mcap"]), "RAVEN-II only");
+    folder.refuses("arm.urdf", &with(&["--arm", "green"]), "has one arm");
+    folder.refuses("arm.urdf", &with(&["--motion", "zigzag"]), "is for RAVEN-II");
+    folder.refuses("none.urdf", &plan, "none.urdf: cannot be read");
+    folder.0.write("bad.urdf", ARM.replace("upper=\"1\"", "upper=\"one\""));
+    folder.refuses("bad.urdf", &plan, "bad.urdf: URDF line 8, joint swing");
+    let table = folder.0.write("table.csv", "t_s,mpos_1_rad,mpos_2_rad\n0,1,2\n0.001,1,2\n");
+    folder.refuses("arm.urdf", &["--commands", text(&table)], "has no column jpos_d_1_m");
+    common::refused(
+        &ravenpose(&["simulate", "--commands", text(&table), "--arm", "both", "--out", text(&folder.file("x"))]),
+        &["--arm both"],
+    );
     assert!(!folder.file("x").exists());
 }

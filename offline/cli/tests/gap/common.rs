@@ -1,51 +1,12 @@
 //! Running the program, reading what it leaves, and data to run it on.
 
+pub(crate) use crate::program::{Folder, done, errors, ravenpose, shared, text, with_effect};
 use gap_report::{Report, Role, Status, Verdict, check};
 use generator::order::{Order, Sealed, Wanted};
 use simulator::RobotModel;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-pub(crate) fn ravenpose(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_ravenpose")).args(arguments).output().expect("ravenpose runs")
-}
-
-pub(crate) fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
-
-/// What the program says when it goes wrong.
-pub(crate) fn errors(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// A folder of our own, gone at the end.
-pub(crate) struct Folder(PathBuf);
-
-impl Folder {
-    pub(crate) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ravenpose-gap-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).expect("folder");
-        Self(path)
-    }
-
-    pub(crate) fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        std::fs::write(self.file(name), bytes).expect("file");
-        self.file(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use std::process::Output;
 
 /// Runs of one robot.
 pub(crate) struct Case {
@@ -55,6 +16,11 @@ pub(crate) struct Case {
 }
 
 impl Case {
+    /// Analyses it into a folder; the report.
+    pub(crate) fn judged(&self, out: &Path) -> Report {
+        report(out, &self.gap(out))
+    }
+
     /// Analyses it into a folder.
     pub(crate) fn gap(&self, out: &Path) -> Output {
         self.gap_with(out, &[])
@@ -87,8 +53,7 @@ pub(crate) fn made(folder: &Folder, label: &str, effects: &[Wanted], seconds: f6
 pub(crate) fn lines(path: &Path) -> Vec<String> {
     let folder = Folder::new(&format!("lines-{}", path.to_string_lossy().replace(['/', '.'], "-")));
     let plain = folder.file("plain.csv");
-    let done = ravenpose(&["convert", text(path), text(&plain)]);
-    assert!(done.status.success(), "{}", errors(&done));
+    done(&["convert", text(path), text(&plain)]);
     let table = std::fs::read_to_string(plain).expect("table");
     table.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
 }
@@ -142,6 +107,20 @@ pub(crate) fn primary(report: &Report) -> Vec<&Verdict> {
     report.verdicts.iter().filter(|verdict| verdict.role == Role::Primary).collect()
 }
 
+/// The first verdict, which has to be this physics at this joint.
+pub(crate) fn named<'r>(report: &'r Report, physics: &str, joint: &str) -> &'r Verdict {
+    let first = primary(report)[0];
+    assert_eq!(first.physics.to_string(), physics, "{}", report.summary);
+    assert_eq!(first.location.joint, [joint]);
+    first
+}
+
+/// An order of the generator: one physics, with these parameters.
+pub(crate) fn wanted(physics: &str, joint: Option<usize>, parameters: &[(&str, f64)]) -> Wanted {
+    let parameters = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+    Wanted { physics: physics.to_owned(), joint, parameters, ..Wanted::default() }
+}
+
 /// Value and interval of a parameter.
 pub(crate) fn parameter(verdict: &Verdict, name: &str) -> (f64, [f64; 2]) {
     let parameter = verdict.parameters.iter().find(|parameter| parameter.name == name);
@@ -165,11 +144,6 @@ pub(crate) fn near(verdict: &Verdict, name: &str, truth: f64, share: f64) {
 
 /// One line on standard error, exit status 2, these words in it, and nothing under the folder.
 pub(crate) fn refused(output: &Output, out: &Path, words: &[&str]) {
-    let error = errors(output);
-    assert_eq!(output.status.code(), Some(2), "{error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
-    for word in words {
-        assert!(error.contains(word), "{word:?} is not in: {error}");
-    }
+    crate::program::refused(output, words);
     assert!(!out.exists(), "{} was written", out.display());
 }

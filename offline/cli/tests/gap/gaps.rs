@@ -1,21 +1,14 @@
 //! Recordings as they come: cells that are empty, rows that were lost, other rates, other lengths, other formats.
 
-use crate::common::{Case, Folder, errors, lines, made, primary, ravenpose, report, text};
+use crate::common::{Case, Folder, done, lines, made, named, parameter, primary, ravenpose, report, text, wanted, with_effect};
 use gap_report::{Report, Status};
-use generator::order::{Sealed, Wanted};
 use std::path::{Path, PathBuf};
 
 const FRICTION: f64 = 2.0;
 
 /// Dry friction of the second joint.
-fn friction(folder: &Folder) -> (Case, Vec<Sealed>) {
-    let parameters = [("f_c".to_owned(), FRICTION)].into();
-    made(
-        folder,
-        "gaps",
-        &[Wanted { physics: "coulomb_friction".to_owned(), joint: Some(2), parameters, ..Wanted::default() }],
-        12.0,
-    )
+fn friction(folder: &Folder) -> Case {
+    made(folder, "gaps", &[wanted("coulomb_friction", Some(2), &[("f_c", FRICTION)])], 12.0).0
 }
 
 /// A table with its rows changed: row from 1, its cells by the header's names.
@@ -36,23 +29,27 @@ fn at(header: &[&str], column: &str) -> usize {
     header.iter().position(|name| *name == column).unwrap_or_else(|| panic!("{column}"))
 }
 
+/// All its recordings changed.
+fn recorded(case: Case, folder: &Folder, change: impl Fn(usize, &[&str], &mut Vec<String>) -> bool) -> Case {
+    let of = |(k, path): (usize, &PathBuf)| changed(folder, &format!("changed_{k}.csv"), path, &change);
+    Case { real: case.real.iter().enumerate().map(of).collect(), ..case }
+}
+
+/// The friction that the report names at the elbow.
 fn named_friction(report: &Report) -> f64 {
-    let first = primary(report)[0];
-    assert_eq!(first.physics.to_string(), "coulomb_friction", "{}", report.summary);
-    assert_eq!(first.location.joint, ["elbow"]);
-    first.parameters.iter().find(|parameter| parameter.name == "f_c").expect("f_c").value
+    parameter(named(report, "coulomb_friction", "elbow"), "f_c").0
+}
+
+fn near_the_truth(found: f64) {
+    assert!((found - FRICTION).abs() < 0.15 * FRICTION, "{found}");
 }
 
 #[test]
 fn empty_cells_and_lost_rows_are_left_out_and_change_little() {
     let folder = Folder::new("holes");
-    let (case, _) = friction(&folder);
-    let whole = {
-        let out = folder.file("whole");
-        let output = case.gap(&out);
-        named_friction(&report(&out, &output))
-    };
-    assert!((whole - FRICTION).abs() < 0.15 * FRICTION, "{whole}");
+    let case = friction(&folder);
+    let whole = named_friction(&case.judged(&folder.file("whole")));
+    near_the_truth(whole);
     // A third of a second without joint encoders, as long without torque, single cells everywhere, a stretch of lost rows; what
     // stands in them is empty, so any of it that got through would be no number.
     let holes = |row: usize, header: &[&str], cells: &mut Vec<String>| {
@@ -69,10 +66,7 @@ fn empty_cells_and_lost_rows_are_left_out_and_change_little() {
         }
         !(8000..8200).contains(&row)
     };
-    let real = case.real.iter().enumerate().map(|(k, path)| changed(&folder, &format!("holes_{k}.csv"), path, holes)).collect();
-    let out = folder.file("out");
-    let output = Case { real, ..case }.gap(&out);
-    let report = report(&out, &output);
+    let report = recorded(case, &folder, holes).judged(&folder.file("out"));
     let found = named_friction(&report);
     assert!((found - whole).abs() < 0.05 * whole, "{found} with holes, {whole} without");
     let told = report.data_quality.iter().find(|quality| quality.check == "gaps").expect("the gaps are told");
@@ -83,7 +77,7 @@ fn empty_cells_and_lost_rows_are_left_out_and_change_little() {
 #[test]
 fn a_channel_that_is_mostly_empty_is_left_out_and_the_others_stay() {
     let folder = Folder::new("mostly");
-    let (case, _) = friction(&folder);
+    let case = friction(&folder);
     let mostly = |row: usize, header: &[&str], cells: &mut Vec<String>| {
         if row > 4000 {
             (1..=2).for_each(|j| cells[at(header, &format!("truth_jpos_{j}_rad"))].clear());
@@ -91,12 +85,8 @@ fn a_channel_that_is_mostly_empty_is_left_out_and_the_others_stay() {
         }
         true
     };
-    let real = case.real.iter().enumerate().map(|(k, path)| changed(&folder, &format!("mostly_{k}.csv"), path, mostly)).collect();
-    let out = folder.file("out");
-    let output = Case { real, ..case }.gap(&out);
-    let report = report(&out, &output);
-    let found = named_friction(&report);
-    assert!((found - FRICTION).abs() < 0.15 * FRICTION, "{found}");
+    let report = recorded(case, &folder, mostly).judged(&folder.file("out"));
+    near_the_truth(named_friction(&report));
     assert!(report.data_quality.iter().any(|quality| quality.message.contains("truth_jpos")), "{:?}", report.data_quality);
     assert!(!report.inputs.channels.contains(&gap_report::Channel::Transmission));
 }
@@ -104,15 +94,12 @@ fn a_channel_that_is_mostly_empty_is_left_out_and_the_others_stay() {
 #[test]
 fn of_unequal_lengths_rates_and_starts_the_common_stretch_counts() {
     let folder = Folder::new("stretch");
-    let (case, _) = friction(&folder);
+    let case = friction(&folder);
     // Each simulation begins later, ends earlier and has every other row.
     let shorter = |row: usize, _: &[&str], _: &mut Vec<String>| (700..11_000).contains(&row) && row.is_multiple_of(2);
     let sim = case.sim.iter().enumerate().map(|(k, path)| changed(&folder, &format!("short_{k}.csv"), path, shorter)).collect();
-    let out = folder.file("out");
-    let output = Case { sim, ..case }.gap(&out);
-    let report = report(&out, &output);
-    let found = named_friction(&report);
-    assert!((found - FRICTION).abs() < 0.15 * FRICTION, "{found}");
+    let report = Case { sim, ..case }.judged(&folder.file("out"));
+    near_the_truth(named_friction(&report));
     for run in &report.inputs.runs {
         assert!((run.duration_s - 10.3).abs() < 0.01, "{} s", run.duration_s);
     }
@@ -121,15 +108,9 @@ fn of_unequal_lengths_rates_and_starts_the_common_stretch_counts() {
 #[test]
 fn states_of_a_raven_and_their_table_are_analysed_alike() {
     let folder = Folder::new("formats");
-    let robot = folder.write(
-        "loose.toml",
-        "schema = \"ravenpose-robot/1\"\nname = \"loose\"\nbase = \"raven2-nominal\"\n[[effect]]\nphysics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }\n",
-    );
-    let runs = folder.file("runs");
-    let made = ["simulate", "--minutes", "0.5", "--seed", "3", "--robot", text(&robot), "--arm", "both", "--out", text(&runs)];
-    let done = ravenpose(&made);
-    assert!(done.status.success(), "{}", errors(&done));
-    let run = runs.join("run_0001.mcap");
+    let effect = "physics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }";
+    let robot = folder.write("loose.toml", with_effect(effect));
+    let run = folder.run("0.5", Some(&robot), &["--arm", "both"]);
     let mut verdicts = Vec::new();
     for name in ["run.mcap", "run.rvs", "run.parquet", "run.csv"] {
         let other = folder.file(name);
@@ -137,8 +118,7 @@ fn states_of_a_raven_and_their_table_are_analysed_alike() {
         if name == "run.csv" {
             words.extend(["--arm", "gold"]);
         }
-        let done = ravenpose(&words);
-        assert!(done.status.success(), "{name}: {}", errors(&done));
+        done(&words);
         let out = folder.file(&format!("out-{name}"));
         let output = ravenpose(&["gap", "--real", text(&other), "--out", text(&out)]);
         let report = report(&out, &output);
@@ -157,10 +137,7 @@ fn states_of_a_raven_and_their_table_are_analysed_alike() {
 #[test]
 fn a_cut_recording_is_used_up_to_the_cut_and_the_report_says_so() {
     let folder = Folder::new("cut");
-    let runs = folder.file("runs");
-    let done = ravenpose(&["simulate", "--minutes", "0.5", "--seed", "3", "--out", text(&runs)]);
-    assert!(done.status.success(), "{}", errors(&done));
-    let whole = std::fs::read(runs.join("run_0001.mcap")).expect("run");
+    let whole = std::fs::read(folder.run("0.5", None, &[])).expect("run");
     let cut = folder.write("cut.mcap", &whole[..whole.len() * 2 / 3]);
     let out = folder.file("out");
     let output = ravenpose(&["gap", "--real", text(&cut), "--out", text(&out)]);

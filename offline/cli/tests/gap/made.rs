@@ -1,14 +1,8 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
-use crate::common::{Case, Folder, errors, made, near, primary, ravenpose, report, text};
+use crate::common::{Case, Folder, made, named, near, primary, report, wanted, with_effect};
 use gap_report::{Report, Status};
-use generator::order::Wanted;
 use std::path::Path;
-
-fn wanted(physics: &str, joint: Option<usize>, parameters: &[(&str, f64)]) -> Wanted {
-    let parameters = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    Wanted { physics: physics.to_owned(), joint, parameters, ..Wanted::default() }
-}
 
 #[test]
 fn of_nothing_nothing_is_said() {
@@ -16,8 +10,7 @@ fn of_nothing_nothing_is_said() {
     let (case, truth) = made(&folder, "null", &[], 12.0);
     assert!(truth.is_empty());
     let out = folder.file("out");
-    let output = case.gap(&out);
-    let report = report(&out, &output);
+    let report = case.judged(&out);
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
     assert!(!out.join("corrected.toml").exists());
 }
@@ -26,12 +19,8 @@ fn of_nothing_nothing_is_said() {
 fn dry_friction_is_named_at_its_joint_and_measured() {
     let folder = Folder::new("coulomb");
     let (case, truth) = made(&folder, "coulomb", &[wanted("coulomb_friction", Some(2), &[("f_c", 2.0)])], 12.0);
-    let out = folder.file("out");
-    let output = case.gap(&out);
-    let report = report(&out, &output);
-    let first = primary(&report)[0];
-    assert_eq!(first.physics.to_string(), "coulomb_friction", "{}", report.summary);
-    assert_eq!(first.location.joint, [truth[0].joint_name.clone().expect("a joint")]);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "coulomb_friction", truth[0].joint_name.as_ref().expect("a joint"));
     near(first, "f_c", truth[0].effect.parameters["f_c"], 0.15);
 }
 
@@ -67,15 +56,8 @@ fn timeless(report: &Report) -> serde_json::Value {
 fn a_corrected_model_leaves_nothing_to_be_found() {
     // What was found, put into the model, and the recordings compared with that.
     let folder = Folder::new("again");
-    let robot = folder.write(
-        "stiff.toml",
-        "schema = \"ravenpose-robot/1\"\nname = \"heavy\"\nbase = \"raven2-nominal\"\n[[effect]]\nphysics = \"payload\"\nparameters = { m_p = 0.2, c_z = -0.45 }\n",
-    );
-    let runs = folder.file("runs");
-    let done = ravenpose(&["simulate", "--minutes", "0.5", "--seed", "3", "--robot", text(&robot), "--out", text(&runs)]);
-    assert!(done.status.success(), "{}", errors(&done));
-    let case = |robot: &Path| Case { robot: robot.to_owned(), real: vec![runs.join("run_0001.mcap")], sim: Vec::new() };
-    let out = folder.file("same");
-    let output = case(&robot).gap(&out);
-    assert_eq!(report(&out, &output).status, Status::NoMismatch, "a robot agrees with its own simulation");
+    let robot = folder.write("heavy.toml", with_effect("physics = \"payload\"\nparameters = { m_p = 0.2, c_z = -0.45 }"));
+    let run = folder.run("0.5", Some(&robot), &[]);
+    let report = Case { robot, real: vec![run], sim: Vec::new() }.judged(&folder.file("same"));
+    assert_eq!(report.status, Status::NoMismatch, "a robot agrees with its own simulation");
 }

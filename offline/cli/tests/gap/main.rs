@@ -6,5 +6,7 @@ mod document;
 mod examples;
 mod gaps;
 mod made;
+#[path = "../common/mod.rs"]
+mod program;
 mod refused;
 mod watch;
