@@ -15,7 +15,7 @@ use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, alike, as_noisy, common};
-use crate::search::{Answer, Effect, Scored, Thresholds, search};
+use crate::search::{Answer, Effect, Thresholds, search};
 use crate::{builtin, closed_loop, corrected, flexible, known, verdicts};
 
 /// One run as it was given.
@@ -278,10 +278,13 @@ fn analyse_with(
         (false, true) => Prior::Drifting,
         (false, false) => Prior::Exact,
     };
-    let problem = prior.put_on(problem);
+    let mut problem = prior.put_on(problem);
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
+    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
+    // What the model gets wrong itself, and the forms of its own effects do, is no further effect.
+    known::put_on(&mut problem, model, given, band);
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
@@ -294,14 +297,6 @@ fn analyse_with(
             let _ = writeln!(std::io::stderr(), "{line}");
         }
     });
-    // What the forms of the model's own effects get wrong is no further effect.
-    let least = known::least(model, &problem, given, band);
-    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
-    answer.effects.retain(|effect| {
-        let Scored { candidate, coefficients, .. } = &effect.chosen;
-        let main = verdicts::main_cell(&floors, candidate, coefficients);
-        candidate.rms(main, coefficients) >= least[main]
-    });
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
     let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
@@ -309,7 +304,8 @@ fn analyse_with(
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {
-            crate::nominal::rms(verdicts::left(&problem, c, answer.effects.iter().zip(&estimates)).into_iter()) >= least[c]
+            crate::nominal::rms(verdicts::left(&problem, c, answer.effects.iter().zip(&estimates)).into_iter())
+                >= problem.practical.any[c]
         })
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
@@ -334,11 +330,7 @@ fn analyse_with(
         unmodelled,
     };
     progress("judging on what was held out");
-    let corrected = answer
-        .effects
-        .iter()
-        .any(Effect::is_named)
-        .then(|| corrected::model(model, &found, given.iter().any(|one| one.sim.is_some())));
+    let corrected = answer.effects.iter().any(Effect::is_named).then(|| corrected::model(model, &found, (given, band)));
     progress("the corrected model, simulated");
     let judged_s = begun.elapsed().as_secs_f64();
     let again = match &corrected {
@@ -396,7 +388,7 @@ impl Prior {
 fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceiling) -> bool {
     let Some((c, _)) = ceiling.cell else { return true };
     let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
-    !problem.from_recording || within.sqrt() > problem.practical[c]
+    !problem.from_recording || within.sqrt() > problem.practical.any[c]
 }
 
 fn too_short(seconds: f64) -> DataQuality {

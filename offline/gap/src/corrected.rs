@@ -6,9 +6,14 @@ use simulator::physics::{
     Payload, Physics, Value, ViscousFriction,
 };
 
-use crate::analysis::Found;
+use arm::serial::{LinkInertia, PARAMETERS};
+
+use crate::analysis::{Found, Given};
 use crate::hypothesis::{Candidate, normals};
 use crate::intervals::Estimate;
+use crate::known;
+use crate::motion::{Band, Motion};
+use crate::turning::Turning;
 
 /// What is believed of the robot, with and without what was missing.
 pub(crate) struct Corrected {
@@ -29,10 +34,11 @@ impl Corrected {
 }
 
 /// The given model with what was missing.
-pub(crate) fn model(given: &RobotModel, found: &Found, learnt: bool) -> Corrected {
+pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], Band)) -> Corrected {
     let mut before = given.clone();
-    if learnt {
+    if runs.iter().any(|one| one.sim.is_some()) {
         believe(&mut before, found);
+        before.model_error = known::model_error(&before, found.robot, runs, band);
     }
     let mut after = before.clone();
     let mut left_out = Vec::new();
@@ -105,19 +111,28 @@ fn named(found: &Found, candidate: &Candidate) -> String {
     format!("{}{at}", candidate.family.physics.replace('_', " "))
 }
 
-/// Drives as learnt from the simulator's output; links stay as the lab has them.
+/// Links and drives as learnt from the simulator's output.
 fn believe(model: &mut RobotModel, found: &Found) {
+    let sims: Vec<&Motion> = found.problem.pairs.iter().filter_map(|pair| pair.sim.as_ref()).collect();
+    let turning = Turning::learn(found.robot, found.nominal, &sims);
     for (j, mut drive) in model.drives().into_iter().enumerate().take(found.robot.joint_count()) {
-        let [rotor, viscous, coulomb, _] = found.nominal.drives[j];
+        let [rotor, ..] = found.nominal.drives[j];
         let square = drive.reduction * drive.reduction;
         let compliance = found.nominal.compliance[j][0];
         if drive.connection == Connection::Force {
             continue;
         }
+        let Turning { viscous, coulomb, width } = turning[j];
+        // Behind the cable there is that part of the friction that stretches it.
+        let [viscous_behind, coulomb_behind] = found.nominal.link_friction[j];
+        (drive.joint_coulomb, drive.joint_viscous) = (coulomb_behind.min(coulomb.max(0.0)), viscous_behind.min(viscous.max(0.0)));
         drive.rotor_inertia_kg_m2 = (rotor / square).max(0.0);
-        drive.motor_viscous_nm_s = (viscous / square).max(0.0);
-        drive.motor_coulomb_nm = (coulomb / drive.reduction.abs()).max(0.0);
-        (drive.joint_coulomb, drive.joint_viscous) = (0.0, 0.0);
+        drive.motor_viscous_nm_s = (viscous - drive.joint_viscous).max(0.0) / square;
+        drive.motor_coulomb_nm = (coulomb - drive.joint_coulomb).max(0.0) / drive.reduction.abs();
+        if let Some(width) = width {
+            drive.joint_sign_width = width;
+            drive.motor_sign_width_rad_s = width * drive.reduction.abs();
+        }
         if compliance > 0.0 {
             drive.connection = Connection::Cable;
             drive.stiffness = 1.0 / compliance;
@@ -127,6 +142,10 @@ fn believe(model: &mut RobotModel, found: &Found) {
         // What a plant cannot have (a drive of another kind) stays as it was.
         let _ = model.set_drive(j, &drive);
     }
+    for (link, learnt) in found.nominal.inertial.as_chunks::<PARAMETERS>().0.iter().enumerate() {
+        // A link that was learnt to weigh less than nothing stays as the lab has it.
+        let _ = model.set_link_inertia(link, &LinkInertia::from_parameters(learnt));
+    }
 }
 
 /// One effect for the simulator, and -1 where it is to be taken off; the reason where it has no such term.
@@ -135,13 +154,15 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
     let joint = family.joints.first().copied();
     let numbers: Vec<(&str, f64)> = estimate.parameters.iter().map(|(named, _)| (named.name, named.value)).collect();
     let mut parameters = Parameters::of(&numbers);
-    let at_joint = || joint.map(Bound::Joint).ok_or_else(|| "it has no joint".to_owned());
+    // Before the cable, where there is one.
+    let on_motor = family.form == "motor side" && joint.is_some_and(|j| found.nominal.compliance[j][0] > 0.0);
+    let at_joint = || joint.map(if on_motor { Bound::Motor } else { Bound::Joint }).ok_or_else(|| "it has no joint".to_owned());
     let mut name = family.physics;
     let bound = match (family.physics, family.form) {
         ("payload", _) if candidate.shape_of("link").is_some_and(|link| link as usize + 1 < found.robot.joint_count()) => {
             // A weight on another link than the last one: what it adds to that link.
             let place = nalgebra::Vector3::from(["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(0.0)));
-            let added = arm::serial::LinkInertia::point(estimate.coefficients[0], place).parameters();
+            let added = LinkInertia::point(estimate.coefficients[0], place).parameters();
             parameters = vector("dpi_B", added.to_vec());
             name = "link_inertia";
             Bound::Link(candidate.shape_of("link").unwrap_or(0.0) as usize)
@@ -169,7 +190,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }
         ("load_dependent_friction", _) => {
             let _ = parameters.0.remove("mu_theta");
-            at_joint()?
+            joint.map(Bound::Joint).ok_or("it has no joint")?
         }
         ("motor_torque_scale", form) if form != "scale" && !parameters.0.contains_key("d_0") => {
             return Err("its offset is in counts of the amplifier, and the robot's file has no torque_constant_nm_a and \

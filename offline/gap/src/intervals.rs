@@ -24,19 +24,22 @@ pub struct Estimate {
     pub coefficients: Vec<f64>,
 }
 
-/// Model error that blocks share and so do not show, as a share of a value: forms of friction, the smoothing of a sign; and
-/// for what is measured in units of the model's load, the weights that a lab gives its links (measured: docs/proof.md).
+/// Model error that blocks share and so do not show, as a share of how far a value is from no effect: forms of friction, the
+/// smoothing of a sign and of what is quick; and for what is measured in units of the model's load, the weights that a lab
+/// gives its links (measured on trials that are not those of docs/proof.md).
 fn common(physics: &str) -> f64 {
     match physics {
-        "cable_stretch"
-        | "cable_creep"
-        | "cable_hysteresis"
-        | "load_dependent_friction"
-        | "gravity_direction"
-        | "motor_torque_scale" => 0.1,
-        "payload" | "link_inertia" | "external_contact" => 0.06,
+        "load_dependent_friction" | "cable_creep" => 0.15,
+        "stribeck_friction" | "thermal_drift" => 0.12,
+        "cable_stretch" | "cable_hysteresis" | "gravity_direction" => 0.1,
+        "payload" | "link_inertia" | "external_contact" | "torque_ripple" => 0.06,
         _ => 0.015,
     }
+}
+
+/// Value of a parameter where there is no effect.
+fn nothing(physics: &str, parameter: &str) -> f64 {
+    if matches!((physics, parameter), ("motor_torque_scale", "kappa") | ("cable_hysteresis", "a")) { 1.0 } else { 0.0 }
 }
 
 /// What a column of the wide fit is the slope of.
@@ -98,7 +101,8 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                 .iter()
                 .enumerate()
                 .map(|(k, named)| {
-                    let half = (reach * spread(&|r| r.0[k].value)).hypot(common * named.value);
+                    let half = (reach * spread(&|r| r.0[k].value))
+                        .hypot(common * (named.value - nothing(candidate.family.physics, named.name)));
                     (named.clone(), [named.value - half, named.value + half])
                 })
                 .collect();

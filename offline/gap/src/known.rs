@@ -1,12 +1,12 @@
 //! What a model with effects already holds: a corrected model is known no better than the forms of its effects are.
 
-use simulator::model::{Bound, RobotModel};
+use simulator::model::{Bound, ModelError, RobotModel};
 
 use crate::analysis::Given;
 use crate::builtin::along_motion;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
-use crate::problem::{Channel, Problem};
+use crate::problem::{Cell, Channel, Problem, held};
 use crate::robot::Robot;
 use crate::run::{Run, common};
 
@@ -14,21 +14,37 @@ use crate::run::{Run, common};
 /// the first one gets wrong. Half of the 20 % by which a gravely wrong form misses; a parameter 30 % off stands far above.
 const OF_KNOWN: f64 = 0.1;
 
+/// Times the model's own error that an effect must reach: what explains nothing but that error is no larger than it is.
+const BEYOND: f64 = 1.2;
+/// The same of more or less of an effect that the model has: of an error of another form a part passes for it.
+const PASSES: f64 = 0.4;
+
 /// Physics and joints of the effects of a model, as families of hypotheses have them.
 pub(crate) fn effects(model: &RobotModel) -> Vec<(String, Vec<usize>)> {
     let joints = |bound: Bound| match bound {
-        Bound::Joint(joint) | Bound::Link(joint) => vec![joint],
+        Bound::Joint(joint) | Bound::Motor(joint) | Bound::Link(joint) => vec![joint],
         Bound::Pair(driven, driver) => vec![driven, driver],
         Bound::Channel(_) | Bound::Robot => Vec::new(),
     };
     model.effects().iter().map(|effect| (effect.physics.name().to_owned(), joints(effect.bound))).collect()
 }
 
-/// Least RMS of an effect in each cell of the problem; 0 where the model's own effects do nothing.
-pub(crate) fn least(model: &RobotModel, problem: &Problem, given: &[Given], band: Band) -> Vec<f64> {
-    let mut least = vec![0.0; problem.cells.len()];
+/// Raises what an effect must amount to: beyond the model's own error, and a share of what its effects do.
+pub(crate) fn put_on(problem: &mut Problem, model: &RobotModel, given: &[Given], band: Band) {
+    let done = done(model, problem, given, band);
+    let practical = &mut problem.practical;
+    for (c, cell) in problem.cells.iter().enumerate() {
+        let error = own_error(&model.model_error, cell);
+        practical.any[c] = practical.any[c].max(BEYOND * error).max(OF_KNOWN * done[c]);
+        practical.known[c] = practical.known[c].max(PASSES * error).max(OF_KNOWN * done[c]);
+    }
+    practical.effects = effects(model);
+}
+
+/// RMS of what the model's own effects do in each cell.
+fn done(model: &RobotModel, problem: &Problem, given: &[Given], band: Band) -> Vec<f64> {
     if model.effects().is_empty() {
-        return least;
+        return vec![0.0; problem.cells.len()];
     }
     let mut bare = model.clone();
     bare.effects_mut().clear();
@@ -38,14 +54,50 @@ pub(crate) fn least(model: &RobotModel, problem: &Problem, given: &[Given], band
         .zip(given)
         .map(|(pair, given)| both(model, &bare, problem.robot, given, &pair.real.run, band))
         .collect();
-    for (c, cell) in problem.cells.iter().enumerate() {
-        let differences = cell.rows.iter().filter_map(|&(r, i)| {
+    let of = |cell: &Cell| {
+        rms(cell.rows.iter().filter_map(|&(r, i)| {
             let [with, without] = both[r].as_ref()?;
             Some(value(with, cell.channel, cell.index, i)? - value(without, cell.channel, cell.index, i)?)
-        });
-        least[c] = OF_KNOWN * rms(differences);
-    }
-    least
+        }))
+    };
+    problem.cells.iter().map(of).collect()
+}
+
+/// What the model is known to get wrong in a cell.
+fn own_error(error: &ModelError, cell: &Cell) -> f64 {
+    let of = match cell.channel {
+        Channel::JointTorque => &error.torque,
+        Channel::Transmission => &error.deflection,
+        Channel::EndEffector => &error.tip_m,
+    };
+    of.get(cell.index).copied().unwrap_or(0.0)
+}
+
+/// What a model leaves of simulations that it was learnt from: RMS in each channel, where the drives move.
+pub(crate) fn model_error(model: &RobotModel, robot: &Robot, given: &[Given], band: Band) -> ModelError {
+    let pairs: Vec<[Motion; 2]> = given
+        .iter()
+        .filter_map(|one| {
+            let (sim, _) = one.sim.as_ref()?;
+            let of = |recording| Run::new(recording, robot).ok();
+            let (sim, own) = common(&of(sim)?, &of(&along_motion(model, sim).ok()?)?).ok()?;
+            Some([sim, own].map(|run| Motion::new(run, band)))
+        })
+        .collect();
+    let of = |channel: Channel, count: usize| -> Vec<f64> {
+        let left = |index: usize| {
+            pairs.iter().flat_map(move |[sim, own]| {
+                let still = held(sim, index);
+                let rows = if channel == Channel::EndEffector { &sim.tip_rows } else { &sim.rows };
+                let moving = rows.iter().filter(move |i| channel == Channel::EndEffector || !still[**i]);
+                moving.filter_map(move |&i| Some(value(sim, channel, index, i)? - value(own, channel, index, i)?))
+            })
+        };
+        let known = !pairs.is_empty() && (0..count).all(|index| left(index).next().is_some());
+        if known { (0..count).map(|index| rms(left(index))).collect() } else { Vec::new() }
+    };
+    let n = robot.joint_count();
+    ModelError { torque: of(Channel::JointTorque, n), deflection: of(Channel::Transmission, n), tip_m: of(Channel::EndEffector, 3) }
 }
 
 /// The recorded motion in the model with its effects, and without.

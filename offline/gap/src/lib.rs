@@ -30,5 +30,6 @@ mod gates;
 mod known;
 mod pictures;
 mod regime;
+mod turning;
 pub mod verdicts;
 pub mod watch;

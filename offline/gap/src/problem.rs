@@ -57,7 +57,7 @@ const HELD: f64 = 0.01;
 const HELD_S: f64 = 0.1;
 
 /// The samples at which a drive is held, with a margin for what smoothing carries over.
-fn held(motion: &Motion, drive: usize) -> Vec<bool> {
+pub(crate) fn held(motion: &Motion, drive: usize) -> Vec<bool> {
     let speed = &motion.quick_velocity[drive];
     let limit = HELD * crate::nominal::rms(speed.iter().copied());
     let (least, margin) = ((HELD_S / motion.run.dt_s) as usize, (0.5 * HELD_S / motion.run.dt_s) as usize);
@@ -83,6 +83,30 @@ pub struct Pair {
     pub sim: Option<Motion>,
 }
 
+/// Least RMS of an effect in each cell: what is smaller may be the error of the nominal model. All 0 where that is not known.
+#[derive(Debug, Clone, Default)]
+pub struct Practical {
+    /// Of any effect.
+    pub any: Vec<f64>,
+    /// Of more or less of an effect that the model has already: its form is known, so that little of another error passes for it.
+    pub known: Vec<f64>,
+    /// Physics and joints of the model's own effects.
+    pub effects: Vec<(String, Vec<usize>)>,
+}
+
+impl Practical {
+    /// For an effect, per cell.
+    pub fn of(&self, physics: &str, joints: &[usize]) -> &[f64] {
+        let known = self.effects.iter().any(|(name, own)| name == physics && own == joints);
+        if known { &self.known } else { &self.any }
+    }
+
+    /// Is there a cell in which an effect must amount to something?
+    pub fn is_known(&self) -> bool {
+        self.any.iter().any(|least| *least > 0.0)
+    }
+}
+
 /// Everything that hypotheses are tested on.
 pub struct Problem<'a> {
     /// The robot.
@@ -103,8 +127,8 @@ pub struct Problem<'a> {
     pub tip_from_truth: bool,
     /// What is known only roughly, per cell.
     pub nuisances: Vec<Nuisance>,
-    /// What the nominal model leaves of the robot that it was learnt from, per cell: a smaller effect may be its error.
-    pub practical: Vec<f64>,
+    /// What an effect must amount to.
+    pub practical: Practical,
     /// Was the nominal model learnt from a recording? What is left is then the model's error, not the sensors' noise.
     pub from_recording: bool,
 }
@@ -145,7 +169,7 @@ impl<'a> Problem<'a> {
             loads,
             tip_from_truth,
             nuisances: Vec::new(),
-            practical: Vec::new(),
+            practical: Practical::default(),
             from_recording: false,
         };
         if pairs.iter().all(|pair| pair.real.torque.is_some()) {
@@ -159,7 +183,8 @@ impl<'a> Problem<'a> {
         }
         problem.lay_blocks(block_s);
         problem.nuisances = vec![Nuisance::default(); problem.cells.len()];
-        problem.practical = vec![0.0; problem.cells.len()];
+        let nothing = vec![0.0; problem.cells.len()];
+        problem.practical = Practical { any: nothing.clone(), known: nothing, effects: Vec::new() };
         problem
     }
 
@@ -170,7 +195,8 @@ impl<'a> Problem<'a> {
         self.silence_nuisances();
         let of =
             |cell: &Cell| if cell.channel == Channel::JointTorque { BEYOND * self.nominal.torque_error[cell.index] } else { 0.0 };
-        self.practical = self.cells.iter().map(of).collect();
+        self.practical.any = self.cells.iter().map(of).collect();
+        self.practical.known.clone_from(&self.practical.any);
         self.from_recording = true;
         self
     }

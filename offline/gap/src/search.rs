@@ -202,12 +202,14 @@ impl Search<'_, '_> {
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
             .fold(0.0, f64::max);
         let theta = &after.coefficients[after.coefficients.len() - scored.candidate.columns.len()..];
+        let family = &scored.candidate.family;
+        let practical = self.problem.practical.of(family.physics, &family.joints);
         let beyond = |c: usize| {
             let told = scored.candidate.effect(c, theta);
-            !told.is_empty()
-                && crate::nominal::rms(self.problem.nuisances[c].without(&told).into_iter()) >= self.problem.practical[c]
+            !told.is_empty() && crate::nominal::rms(self.problem.nuisances[c].without(&told).into_iter()) >= practical[c]
         };
-        let enough = !self.problem.from_recording || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
+        let enough =
+            !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
         Judged { gain, share, amplitude: if enough { amplitude } else { -1.0 } }

@@ -117,6 +117,11 @@ fn add(plant: &mut Plant, tool: &mut ToolAxes, effect: &Effect) -> Result<(), Pl
     match effect.bound {
         Bound::Joint(joint) if joint < plant.joints() => on_joint(plant, effect, joint),
         Bound::Joint(joint) => on_tool(tool, effect, joint),
+        Bound::Motor(joint) => {
+            let drive = if joint < plant.joints() { plant.drive_mut(joint) } else { &mut tool.drives[joint - FIRST] };
+            drive.rub_motor(effect);
+            Ok(())
+        }
         Bound::Pair(driven, driver) => {
             let Physics::JointCoupling(coupling) = effect.physics else { return Ok(()) };
             let timed = Timed::new(coupling, effect.from_s, effect.to_s);

@@ -143,6 +143,7 @@ fn the_inverse_of_a_simulation_is_the_simulation() {
     for (name, robot) in [
         ("nothing", plain.clone()),
         ("coulomb", with(&plain, "coulomb_friction", &[("f_c", 2.0)], Bound::Joint(0), forever)),
+        ("motor", with(&plain, "coulomb_friction", &[("f_c", 2.0)], Bound::Motor(0), forever)),
         ("load", with(&plain, "load_dependent_friction", &[("mu_l", 0.3)], Bound::Joint(1), forever)),
         ("backlash", with(&plain, "backlash", &[("b", 0.002)], Bound::Joint(1), forever)),
         ("stretch", with(&plain, "cable_stretch", &[("k", 800.0)], Bound::Joint(1), forever)),
@@ -206,3 +207,51 @@ damping = 100
 [coupling]
 matrix = [[1, 0, 0], [0.145, 1, 0], [0.008, 0.0081, 1]]
 ";
+
+#[test]
+fn friction_of_a_motor_asks_the_torque_of_a_joints_but_does_not_stretch_its_cable() {
+    let mut bare = RobotModel::from_urdf(THREE_JOINTS).expect("URDF");
+    for joint in 0..3 {
+        let mut drive = bare.drives()[joint];
+        (drive.connection, drive.stiffness, drive.damping, drive.rotor_inertia_kg_m2) = (Connection::Cable, 900.0, 1.0, 1e-5);
+        bare.set_drive(joint, &drive).expect("drive");
+    }
+    let ratio = bare.drives()[1].reduction;
+    // The second joint turns steadily, far above the width of its sign, backward and forward.
+    for speed in [-0.8, 0.8] {
+        let rows = 200;
+        let place = |row: usize| [0.4, 1.2 + speed * row as f64 * 1e-3, -0.2];
+        let motor = |joints: [f64; 3]| -> Vector {
+            let mut motors = Vector::default();
+            (0..3).for_each(|j| motors[j] = joints[j] * bare.drives()[j].reduction);
+            motors
+        };
+        let motion = Motion {
+            given: Given::Motors,
+            time_s: (0..rows).map(|row| row as f64 * 1e-3).collect(),
+            positions: (0..rows).map(|row| motor(place(row))).collect(),
+            rates: vec![motor([0.0, speed, 0.0]); rows],
+            accelerations: vec![Vector::default(); rows],
+        };
+        let played = |bound: Option<Bound>, name: &str, numbers: &[(&str, f64)]| {
+            let mut robot = bare.clone();
+            robot.effects_mut().extend(bound.map(|bound| Effect::new(physics(name, numbers), bound)));
+            let found = inverse(&robot, &motion).expect("inverse");
+            (found.torque[rows - 1][1], found.true_joints[rows - 1][1])
+        };
+        let (torque, joint) = played(None, "", &[]);
+        for (name, numbers, level) in [
+            ("coulomb_friction", &[("f_c", 0.5)][..], 0.5 * speed.signum()),
+            ("coulomb_friction", &[("f_c", 0.5), ("f_c_asym", 0.2)], 0.5 * speed.signum() + 0.1),
+            ("viscous_friction", &[("b", 0.25)], 0.25 * speed),
+            ("stribeck_friction", &[("f_c", 0.3), ("f_s", 0.6), ("v_s", 0.01), ("a", 2.0)], 0.3 * speed.signum()),
+        ] {
+            let (with, there) = played(Some(Bound::Motor(1)), name, numbers);
+            assert!(((with - torque) * ratio - level).abs() < 1e-6, "{name}: {} for {level}", (with - torque) * ratio);
+            assert_eq!(there, joint, "{name}");
+            let (with, there) = played(Some(Bound::Joint(1)), name, numbers);
+            assert!(((with - torque) * ratio - level).abs() < 2e-3, "{name}: {} for {level}", (with - torque) * ratio);
+            assert!((joint - there - level / 900.0).abs() < 1e-5, "{name}: {}", joint - there);
+        }
+    }
+}

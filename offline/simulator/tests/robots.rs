@@ -7,7 +7,7 @@ use arm::Side;
 use arm::serial::LinkInertia;
 use common::urdf::{THREE_JOINTS, gap_urdf};
 use nalgebra::{Matrix3, Vector3};
-use simulator::model::{Bound, Connection, ControllerModel, ControllerNumbers, PayloadSite};
+use simulator::model::{Bound, Connection, ControllerModel, ControllerNumbers, ModelError, PayloadSite};
 use simulator::physics::{Channel, Parameters, Physics, Value};
 use simulator::plant::Passive;
 use simulator::{Effect, RobotModel};
@@ -58,6 +58,9 @@ velocity_share = [1, 1, 1]
 mass_kg = 1.5
 com_m = [0.0, -0.16, 0.2]
 inertia_com_kg_m2 = [[0.004, 0, 0], [0, 0.005, 1e-4], [0, 1e-4, 0.008]]
+[model_error]
+torque = [0.05, 0.06, 0.5]
+tip_m = [1e-5, 2e-5, 3e-5]
 [homing]
 offset_sd = [0.01, 0.01, 0.001]
 [integrator]
@@ -107,6 +110,7 @@ fn a_file_says_drives_coupling_gains_inertia_and_effects() {
     assert_eq!(robot.effects()[1].bound, Bound::Link(3));
     assert_eq!(robot.effects()[2].bound, Bound::Channel(Channel::EndEffector));
     assert_eq!(robot.effects()[3].to_s, 5.0);
+    assert_eq!(robot.model_error, ModelError { torque: vec![0.05, 0.06, 0.5], deflection: vec![], tip_m: vec![1e-5, 2e-5, 3e-5] });
     robot.plant().expect("a plant");
 }
 
@@ -137,6 +141,7 @@ fn every_physics_is_written_as_it_was_read() {
     for (name, bound, numbers) in [
         ("coulomb_friction", Bound::Joint(0), vec![("f_c", 0.1), ("f_c_asym", -0.2)]),
         ("viscous_friction", Bound::Joint(1), vec![("b", 0.3)]),
+        ("coulomb_friction", Bound::Motor(1), vec![("f_c", 0.4)]),
         ("stribeck_friction", Bound::Joint(2), vec![("f_c", 0.1), ("f_s", 0.2), ("v_s", 1.0 / 3.0), ("a", 1.5)]),
         ("load_dependent_friction", Bound::Joint(0), vec![("mu_theta", 0.3)]),
         ("backlash", Bound::Joint(0), vec![("b", 1e-3)]),
@@ -250,6 +255,11 @@ fn what_means_nothing_is_refused_with_line_key_and_remedy() {
         ("\n[[effect]]\nphysics = \"dust\"\n", 2, &["effect 1 (dust): no such physics"]),
         ("[[effect]]\nphysics = \"backlash\"\njoint = \"elbo\"\nparameters = { b = 1 }\n", 1, &["`joint` is `elbo`", "elbow"]),
         ("[[effect]]\nphysics = \"backlash\"\nparameters = { b = 1 }\n", 1, &["needs `joint`", "shoulder"]),
+        ("[[effect]]\nphysics = \"backlash\"\nmotor = 1\nparameters = { b = 1 }\n", 1, &["takes no `motor`"]),
+        ("[[effect]]\nphysics = \"viscous_friction\"\nmotor = 4\nparameters = { b = 1 }\n", 1, &["`motor` is 4"]),
+        ("[[effect]]\nphysics = \"viscous_friction\"\njoint = 1\nmotor = 1\nparameters = { b = 1 }\n", 1, &["not both"]),
+        ("[model_error]\ntorque = [0.1]\n", 1, &["model_error.torque must hold 3 numbers"]),
+        ("[model_error]\nspeed = [0.1]\n", 2, &["unknown field `speed`"]),
         ("[[effect]]\nphysics = \"cable_hysteresis\"\njoint = 1\nparameters = { a = 0.5, k = 1, z_m = 0 }\n", 1, &["other than 0"]),
     ] {
         let (text, found) = refused(rest);

@@ -142,20 +142,13 @@ impl<'a> Dictionary<'a> {
 
     /// Values of the grid carried over to the tip's rows: those of the nearest row.
     pub fn to_tip(&self, grid: &[f64]) -> Vec<f64> {
-        let mut start = vec![0; self.problem.pairs.len()];
-        for (r, pair) in self.problem.pairs.iter().enumerate().skip(1) {
-            start[r] = start[r - 1] + self.problem.pairs[r - 1].real.rows.len();
-            let _ = pair;
+        let mut start = Vec::with_capacity(self.problem.pairs.len());
+        let mut next = 0;
+        for pair in self.problem.pairs {
+            start.push(next);
+            next += pair.real.rows.len();
         }
-        self.tip_rows
-            .iter()
-            .map(|&(r, i)| {
-                let rows = &self.problem.pairs[r].real.rows;
-                let step = rows.get(1).map_or(1, |second| second - rows[0]);
-                let k = ((i.saturating_sub(rows[0]) + step / 2) / step).min(rows.len() - 1);
-                grid[start[r] + k]
-            })
-            .collect()
+        self.tip_rows.iter().map(|&(r, i)| grid[start[r] + nearest(&self.problem.pairs[r].real.rows, i)]).collect()
     }
 
     /// Torques that the joints need in addition, one series per joint (none: no torque). Those of the links also load the
@@ -261,4 +254,21 @@ pub(super) fn minus(a: &[f64]) -> Vec<f64> {
 /// Root of the mean square of a series.
 pub(super) fn size(series: &[f64]) -> f64 {
     crate::nominal::rms(series.iter().copied())
+}
+
+/// Place of the row nearest to a sample; rows are missing where the recording has holes.
+fn nearest(rows: &[usize], sample: usize) -> usize {
+    let after = rows.partition_point(|row| *row < sample);
+    let before = after.saturating_sub(1);
+    if after < rows.len() && rows[after] - sample < sample.saturating_sub(rows[before]) { after } else { before }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_row_nearest_to_a_sample_is_found_on_both_sides_of_a_hole() {
+        let rows = [100, 120, 140, 400, 420];
+        let of = |sample| super::nearest(&rows, sample);
+        assert_eq!([of(90), of(109), of(111), of(140), of(250), of(300), of(415), of(1000)], [0, 0, 1, 2, 2, 3, 4, 4]);
+    }
 }

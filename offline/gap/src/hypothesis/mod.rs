@@ -251,7 +251,7 @@ pub(crate) fn rounds(name: &str) -> bool {
 }
 
 /// So many numbers from one to another, each the same times the one before.
-fn geometric(from: f64, to: f64, count: usize) -> Vec<f64> {
+pub(crate) fn geometric(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..count).map(|k| from * (to / from).powf(k as f64 / (count - 1) as f64)).collect()
 }
 

@@ -122,20 +122,26 @@ fn bent(l: f64, c: f64) -> f64 {
 /// A position that steps: the instants are those at which steps take most out of what is seen, run by run.
 fn push_steps(dictionary: &Dictionary, j: usize, cell: usize, all: &mut Vec<Family>) {
     let seen = &dictionary.problem.cells[cell].residual;
-    let mut places: Vec<(usize, usize)> = Vec::new();
-    for r in 0..dictionary.problem.pairs.len() {
+    // By name and time, since what is held out has other runs, or a later part of the same.
+    let mut places: Vec<(String, f64)> = Vec::new();
+    for (r, pair) in dictionary.problem.pairs.iter().enumerate() {
         let own: Vec<usize> = (0..dictionary.grid.len()).filter(|k| dictionary.grid[*k].0 == r).collect();
         let Some(first) = own.first() else { continue };
         let values: Vec<f64> = own.iter().map(|k| seen[*k]).collect();
-        places.extend(steps(&values).into_iter().map(|k| (r, dictionary.grid[first + k].1)));
+        let run = &pair.real.run;
+        places.extend(steps(&values).into_iter().map(|k| (run.id.clone(), run.time_s(dictionary.grid[first + k].1))));
     }
     if places.is_empty() {
         return;
     }
     let count = places.len();
     let family = Family::fixed(UNMODELLED, &[j], "steps in time", Channel::Transmission, &vec![Bound::Free; count], move |d| {
-        let step = |&(r, from): &(usize, usize)| {
-            d.deflection_of(j, d.grid.iter().map(|&(run, i, _)| f64::from(u8::from(run == r && i >= from))).collect())
+        let step = |(id, from_s): &(String, f64)| {
+            let since = |r: usize, i: usize| {
+                let run = &d.problem.pairs[r].real.run;
+                f64::from(u8::from(run.id == *id && run.time_s(i) >= *from_s))
+            };
+            d.deflection_of(j, d.at_grid(|r, i, _| since(r, i)))
         };
         places.iter().map(step).collect()
     });

@@ -105,6 +105,7 @@ fn add(plant: &mut Plant, robot: &UrdfRobot, effect: &Effect) -> Result<(), Plan
             }
             return on_joint(plant, effect, joint);
         }
+        (Bound::Motor(joint), _) => plant.drive_mut(joint).rub_motor(effect),
         (Bound::Pair(driven, driver), Physics::JointCoupling(coupling)) => {
             plant.add_coupling(Timed::new(coupling, from, to), driven, driver);
         }

@@ -7,6 +7,8 @@ use crate::physics::{Channel, MeasurementDelay, Parameters, Physics, Place, name
 pub enum Bound {
     /// A joint.
     Joint(usize),
+    /// The motor of a joint: friction before the cable, which does not stretch it. Sizes are still those at the joint.
+    Motor(usize),
     /// A joint, and the joint that drives it.
     Pair(usize, usize),
     /// A link; one past the last is the tool that is fixed to it.
@@ -52,6 +54,7 @@ pub(super) enum Which {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Given {
     pub(super) joint: Option<Which>,
+    pub(super) motor: Option<Which>,
     pub(super) driven_by: Option<Which>,
     pub(super) link: Option<Which>,
     pub(super) channel: Option<String>,
@@ -72,7 +75,12 @@ impl Effect {
             return Err(format!("no such physics; the vocabulary has {}", names().join(", ")));
         };
         let physics = physics.map_err(|error| error.to_string())?;
-        let bound = bound(place, given, known)?;
+        let bound = match &given.motor {
+            Some(_) if given.joint.is_some() => return Err("takes `joint` or `motor`, not both".to_owned()),
+            Some(_) if !rubs_before_the_cable(&physics) => return Err("takes no `motor`".to_owned()),
+            Some(motor) => Bound::Motor(index("motor", Some(motor), &known.joints)?),
+            None => bound(place, given, known)?,
+        };
         let (from_s, to_s) = (given.from_s.unwrap_or(f64::NEG_INFINITY), given.to_s.unwrap_or(f64::INFINITY));
         if from_s.is_nan() || to_s.is_nan() || from_s >= to_s {
             return Err("from_s must lie before to_s".to_owned());
@@ -83,6 +91,11 @@ impl Effect {
         }
         Ok(Self { physics, bound, from_s, to_s, source: given.source.clone() })
     }
+}
+
+/// Friction that may be the motor's.
+fn rubs_before_the_cable(physics: &Physics) -> bool {
+    matches!(physics, Physics::CoulombFriction(_) | Physics::ViscousFriction(_) | Physics::StribeckFriction(_))
 }
 
 fn bound(place: Place, given: &Given, known: &Names) -> Result<Bound, String> {

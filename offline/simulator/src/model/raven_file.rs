@@ -26,6 +26,8 @@ struct RobotFile {
     stiction: Option<Spanned<StictionTable>>,
     #[serde(default, rename = "columns")]
     _columns: toml::Table,
+    #[serde(default, rename = "model_error")]
+    _model_error: toml::Table,
     #[serde(default, rename = "payload_site")]
     sites: Vec<Spanned<SiteTable>>,
     #[serde(default, rename = "effect")]

@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 use super::error::syntax;
 use super::{
-    ControllerModel, DriveModel, Effect, MappedColumn, Robot, RobotError, UrdfRobot, columns, raven, raven_file, save, urdf_file,
+    ControllerModel, DriveModel, Effect, MappedColumn, ModelError, Robot, RobotError, UrdfRobot, columns, model_error, raven,
+    raven_file, save, urdf_file,
 };
 use crate::plant::{Passive, Plant, PlantError};
 use crate::{any_arm, robot_plant};
@@ -36,6 +37,8 @@ pub struct RobotModel {
     pub payload_sites: Vec<PayloadSite>,
     /// Names of columns in its recordings that are not those of tidy CSV.
     pub columns: Vec<MappedColumn>,
+    /// How far it is off what it was learnt from.
+    pub model_error: ModelError,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -85,20 +88,23 @@ impl RobotModel {
                 return Err(RobotError::Kind { key: "schema", found, expected: "`ravenpose-robot/1` or `raven2-plant/1`" });
             }
         }
-        match header.base.as_deref() {
+        let (kind, payload_sites) = match header.base.as_deref() {
             Some("raven2-nominal") => {
-                let (robot, payload_sites) = raven_file::robot(text)?;
-                Ok(Self { payload_sites, columns: columns::read(text)?, ..Self::raven(robot, Side::Gold) })
+                let (robot, sites) = raven_file::robot(text)?;
+                (Kind::Raven(Box::new(robot)), sites)
             }
             Some("urdf") => {
-                let (robot, payload_sites) = urdf_file::robot(text, folder)?;
-                Ok(Self { payload_sites, columns: columns::read(text)?, ..Self::of(Kind::Urdf(Box::new(robot))) })
+                let (robot, sites) = urdf_file::robot(text, folder)?;
+                (Kind::Urdf(Box::new(robot)), sites)
             }
             other => {
                 let found = other.unwrap_or("missing").to_owned();
-                Err(RobotError::Kind { key: "base", found, expected: "`raven2-nominal` or `urdf`" })
+                return Err(RobotError::Kind { key: "base", found, expected: "`raven2-nominal` or `urdf`" });
             }
-        }
+        };
+        let model = Self::of(kind);
+        let model_error = model_error::read(text, model.joint_count())?;
+        Ok(Self { payload_sites, columns: columns::read(text)?, model_error, ..model })
     }
 
     /// From the text of a URDF: rigid transmissions, no rotors.
@@ -115,7 +121,7 @@ impl RobotModel {
     }
 
     fn of(kind: Kind) -> Self {
-        Self { kind, side: Side::Gold, payload_sites: Vec::new(), columns: Vec::new() }
+        Self { kind, side: Side::Gold, payload_sites: Vec::new(), columns: Vec::new(), model_error: ModelError::default() }
     }
 
     /// The same robot, its other arm. A robot from a URDF has one arm only.

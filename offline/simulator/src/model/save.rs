@@ -36,6 +36,10 @@ pub(super) fn text(model: &RobotModel) -> String {
             };
         }
     }
+    for (k, (key, list)) in model.model_error.known().enumerate() {
+        out.push_str(if k == 0 { "\n[model_error]\n" } else { "" });
+        let _ = writeln!(out, "{key} = {}", array(list));
+    }
     for effect in model.effects() {
         push_effect(&mut out, effect, &joints, &links);
     }
@@ -134,6 +138,7 @@ fn push_effect(out: &mut String, effect: &Effect, joints: &[String], links: &[St
     let _ = writeln!(out, "\n[[effect]]\nphysics = \"{}\"", effect.physics.name());
     match effect.bound {
         Bound::Joint(joint) => drop(writeln!(out, "joint = {}", quoted(&joints[joint]))),
+        Bound::Motor(joint) => drop(writeln!(out, "motor = {}", quoted(&joints[joint]))),
         Bound::Pair(driven, driver) => {
             let _ = writeln!(out, "joint = {}\ndriven_by = {}", quoted(&joints[driven]), quoted(&joints[driver]));
         }

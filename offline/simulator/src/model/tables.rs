@@ -15,6 +15,7 @@ use crate::physics::{Parameters, Value};
 pub(super) struct EffectTable {
     physics: String,
     joint: Option<Which>,
+    motor: Option<Which>,
     driven_by: Option<Which>,
     link: Option<Which>,
     channel: Option<String>,
@@ -63,6 +64,7 @@ fn effect(table: &EffectTable, names: &Names) -> Result<Effect, String> {
     });
     let given = Given {
         joint: table.joint.clone(),
+        motor: table.motor.clone(),
         driven_by: table.driven_by.clone(),
         link: table.link.clone(),
         channel: table.channel.clone(),

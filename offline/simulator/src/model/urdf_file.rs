@@ -45,6 +45,8 @@ struct UrdfFile {
     integrator: Option<Spanned<IntegratorTable>>,
     #[serde(default, rename = "columns")]
     _columns: toml::Table,
+    #[serde(default, rename = "model_error")]
+    _model_error: toml::Table,
     #[serde(default, rename = "payload_site")]
     sites: Vec<Spanned<SiteTable>>,
     #[serde(default, rename = "effect")]

@@ -6,6 +6,7 @@ use crate::physics::{
 };
 
 use super::DriveNumbers;
+use super::rub::Rub;
 
 /// An effect and the time in which it acts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +42,8 @@ pub(crate) struct Drive {
     pub(crate) viscous: Vec<Timed<ViscousFriction>>,
     pub(crate) stribeck: Vec<Timed<StribeckFriction>>,
     pub(crate) load: Vec<Timed<LoadDependentFriction>>,
+    /// Friction before the cable, in units of the joint.
+    pub(crate) on_motor: Vec<Timed<Rub>>,
     pub(crate) backlash: Vec<Timed<Backlash>>,
     pub(crate) stretch: Vec<Timed<CableStretch>>,
     /// With the place of the memory in the plant's auxiliary state; at most one.
@@ -110,6 +113,7 @@ impl Drive {
             viscous: Vec::new(),
             stribeck: Vec::new(),
             load: Vec::new(),
+            on_motor: Vec::new(),
             backlash: Vec::new(),
             stretch: Vec::new(),
             hysteresis: Vec::new(),
@@ -131,6 +135,7 @@ impl Drive {
         self.viscous.iter_mut().for_each(|effect| switched |= effect.at(time_s));
         self.stribeck.iter_mut().for_each(|effect| switched |= effect.at(time_s));
         self.load.iter_mut().for_each(|effect| switched |= effect.at(time_s));
+        self.on_motor.iter_mut().for_each(|effect| switched |= effect.at(time_s));
         self.backlash.iter_mut().for_each(|effect| switched |= effect.at(time_s));
         self.stretch.iter_mut().for_each(|effect| switched |= effect.at(time_s));
         self.hysteresis.iter_mut().for_each(|(effect, _)| switched |= effect.at(time_s));
@@ -212,10 +217,16 @@ impl Drive {
     /// Friction of motor and gearbox at a motor speed: N·m at the capstan, and the chord.
     #[inline]
     pub(crate) fn motor_friction(&self, speed: f64, warm: f64) -> (f64, f64) {
-        let motor = &self.nominal.motor;
+        let DriveNumbers { motor, ratio, gear, .. } = &self.nominal;
         let (sign, chord) = sign_and_chord(speed, motor.width);
-        let coulomb = warm * motor.coulomb;
-        (coulomb * sign + motor.viscous * speed, coulomb * chord + motor.viscous)
+        let (mut level, mut one_sided, mut viscous) = (motor.coulomb, 0.0, motor.viscous);
+        for rub in on(&self.on_motor) {
+            let own = rub.at(speed / ratio, sign * ratio.signum());
+            level += gear / ratio.abs() * own.level;
+            one_sided += gear / ratio * own.one_sided;
+            viscous += gear / (ratio * ratio) * own.viscous;
+        }
+        (warm * (level * sign + one_sided) + viscous * speed, warm * level * chord + viscous)
     }
 
     /// Friction of the joint at its speed.
@@ -251,6 +262,16 @@ impl Drive {
             slope: warm * level * chord + viscous,
             sign_slope: chord,
         }
+    }
+
+    /// Slope of the motor's friction at standstill with every effect acting.
+    pub(crate) fn steepest_motor_friction(&self) -> f64 {
+        let DriveNumbers { motor, ratio, gear, .. } = &self.nominal;
+        let slope = |rub: &Timed<Rub>| {
+            let (level, viscous) = rub.effect.most();
+            gear / ratio.abs() * level / motor.width + gear / (ratio * ratio) * viscous
+        };
+        motor.coulomb / motor.width + motor.viscous + self.on_motor.iter().map(slope).sum::<f64>()
     }
 
     /// Slope of the joint's friction at standstill with every effect acting.

@@ -14,6 +14,7 @@ mod numbers;
 mod rates;
 mod rest;
 mod rigid;
+mod rub;
 mod step;
 
 use arm::serial::{SerialArm, Workspace};

@@ -14,7 +14,7 @@ impl Plant {
             let drive = &self.drives[i];
             let nominal = &drive.nominal;
             let damping = nominal.radius_m * nominal.radius_m * nominal.cable.at(0.0).damping_ns_m;
-            let motor = nominal.motor.coulomb / nominal.motor.width + nominal.motor.viscous;
+            let motor = drive.steepest_motor_friction();
             let link = drive.steepest_friction() + damping + nominal.passive.damping;
             if nominal.between == Between::Rigid {
                 let armature = nominal.ratio * nominal.ratio / nominal.gear;
