@@ -16,7 +16,8 @@ use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
-use crate::{builtin, closed_loop, corrected, flexible, known, verdicts};
+use crate::seldom::Seldom;
+use crate::{builtin, closed_loop, corrected, flexible, known, seldom, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -107,6 +108,8 @@ pub struct Found<'a> {
     pub controller: Option<crate::controller::Changed>,
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
+    /// Something far above the noise where nothing was found.
+    pub seldom: Option<Seldom>,
 }
 
 /// Least length of what is fitted on, s.
@@ -328,6 +331,10 @@ fn analyse_with(
         beside: &beside,
         controller: given.iter().all(|one| one.sim.is_some()).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,
+        // Only against a lab's own simulation, whose floors are known.
+        seldom: (answer.effects.is_empty() && !unmodelled && !from_recording && given.iter().all(|one| one.sim.is_some()))
+            .then(|| seldom::left(&problem, &floors))
+            .flatten(),
     };
     progress("judging on what was held out");
     let corrected = answer.effects.iter().any(Effect::is_named).then(|| corrected::model(model, &found, (given, band)));

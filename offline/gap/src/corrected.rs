@@ -1,5 +1,6 @@
 //! The robot model with what was missing.
 
+use recordings::Recording;
 use simulator::model::{Bound, Connection, Effect, RobotModel};
 use simulator::physics::{
     Backlash, CableStretch, Channel as DelayChannel, CoulombFriction, JointCoupling, JointOffset, MotorTorqueScale, Parameters,
@@ -9,6 +10,7 @@ use simulator::physics::{
 use arm::serial::{LinkInertia, PARAMETERS};
 
 use crate::analysis::{Found, Given};
+use crate::builtin::along_motion;
 use crate::hypothesis::{Candidate, normals};
 use crate::intervals::Estimate;
 use crate::known;
@@ -52,8 +54,9 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
                 }
                 with.effects_mut().push(effect);
             }
-            // A file that could not be read again would be worse than one without the effect.
+            // A file that could not be read again, or a simulation that runs away, would be worse than one without the effect.
             with.plant().map_err(|error| error.to_string())?;
+            stays(&with, &runs[0].real)?;
             RobotModel::from_toml(&with.to_toml(), None).map_err(|error| error.to_string())?;
             Ok(with)
         });
@@ -64,6 +67,17 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
     }
     after.set_name(&format!("{} corrected", given.name()));
     Corrected { before, after, left_out }
+}
+
+/// Largest number in any unit that a robot's simulation may reach.
+const FAR: f64 = 1e6;
+
+/// Does a model stay where numbers mean something, along a recorded motion?
+fn stays(model: &RobotModel, real: &Recording) -> Result<(), String> {
+    // What cannot be played at all is told elsewhere.
+    let Ok(played) = along_motion(model, real) else { return Ok(()) };
+    let away = played.columns.iter().find(|column| !column.values.iter().all(|value| value.abs() < FAR));
+    away.map_or(Ok(()), |column| Err(format!("the simulator runs away with it ({})", column.name)))
 }
 
 /// Puts more (or less: a sign of -1) of what the model has already into the effect that it has; false where it has none, or the two do not

@@ -1,7 +1,7 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::hypothesis::{Candidate, Column, Dictionary, Window, rounds};
-use crate::nominal::Nominal;
+use crate::nominal::{Nominal, rms};
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
 use crate::score::Scorer;
@@ -30,16 +30,20 @@ pub struct Estimate {
 fn common(physics: &str) -> f64 {
     match physics {
         "load_dependent_friction" | "cable_creep" => 0.15,
-        "stribeck_friction" | "thermal_drift" => 0.12,
-        "cable_stretch" | "cable_hysteresis" | "gravity_direction" => 0.1,
-        "payload" | "link_inertia" | "external_contact" | "torque_ripple" => 0.06,
+        "stribeck_friction" | "thermal_drift" | "gravity_direction" => 0.12,
+        "cable_stretch" | "cable_hysteresis" | "torque_ripple" => 0.1,
+        "payload" | "link_inertia" | "external_contact" => 0.06,
         _ => 0.015,
     }
 }
 
-/// Value of a parameter where there is no effect.
-fn nothing(physics: &str, parameter: &str) -> f64 {
-    if matches!((physics, parameter), ("motor_torque_scale", "kappa") | ("cable_hysteresis", "a")) { 1.0 } else { 0.0 }
+/// How far a parameter is from no effect; of a direction, the whole of it.
+fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
+    match (physics, named.name) {
+        ("motor_torque_scale", "kappa") | ("cable_hysteresis", "a") => named.value - 1.0,
+        ("gravity_direction", _) => rms(all.iter().map(|own| own.value)) * (all.len() as f64).sqrt(),
+        _ => named.value,
+    }
 }
 
 /// What a column of the wide fit is the slope of.
@@ -101,8 +105,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                 .iter()
                 .enumerate()
                 .map(|(k, named)| {
-                    let half = (reach * spread(&|r| r.0[k].value))
-                        .hypot(common * (named.value - nothing(candidate.family.physics, named.name)));
+                    let half = (reach * spread(&|r| r.0[k].value)).hypot(common * size(candidate.family.physics, named, &values));
                     (named.clone(), [named.value - half, named.value + half])
                 })
                 .collect();

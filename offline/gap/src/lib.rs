@@ -30,6 +30,7 @@ mod gates;
 mod known;
 mod pictures;
 mod regime;
+pub mod seldom;
 mod turning;
 pub mod verdicts;
 pub mod watch;

@@ -44,8 +44,10 @@ const ALWAYS: [&str; 9] = [
     "frame_misalignment",
     "measurement_delay",
 ];
-/// Times its standard error over the blocks that the gain of an effect in a window has to reach.
+/// Times its standard error over the blocks that the gain of an effect has to reach,
 const SEEN_OFTEN: f64 = 2.0;
+/// but for what is met seldom by its nature: a wall, a load that changes sides.
+const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
 
@@ -261,9 +263,10 @@ impl Search<'_, '_> {
 
     fn accepts(&self, scored: &Scored, judged: &Judged) -> bool {
         let alone = judged.amplitude.is_infinite();
+        let seldom = scored.candidate.edges() == 0 && SELDOM.contains(&scored.candidate.family.physics);
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
-            && (scored.candidate.edges() == 0 || judged.gain.nats > SEEN_OFTEN * judged.gain.error)
+            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error)
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }

@@ -20,6 +20,7 @@ use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::Run;
 use crate::search::{Effect, Scored};
+use crate::seldom::Seldom;
 use crate::{experiment, regime};
 
 /// Noise of a cell, from how much it differs three rows apart: half of them by less than noise gives, so that effects, which
@@ -134,9 +135,12 @@ pub(crate) fn outcome(
             primary.fit.extend(again.iter().cloned());
         }
     }
-    let unnamed = found.controller.is_some() || effects.iter().any(|effect| !effect.is_named());
+    let unnamed = found.controller.is_some() || found.seldom.is_some() || effects.iter().any(|effect| !effect.is_named());
     if let Some(changed) = found.controller {
         verdicts.push(another_controller(found, effects.len() as u64 + 1, changed));
+    }
+    if let (Some(seldom), None) = (&found.seldom, found.controller) {
+        verdicts.push(seen_seldom(found, seldom));
     }
     if found.unmodelled && !unnamed {
         verdicts.push(unmodelled(found, effects.len() as u64 + 1));
@@ -498,6 +502,29 @@ fn another_controller(found: &Found, number: u64, changed: Changed) -> Verdict {
     Verdict::unmodelled(number, 0.9, Location::new(Told::Command, joint, Subsystem::Controller, regime), evidence)
 }
 
+/// The verdict of what is there, but too seldom to be explained.
+fn seen_seldom(found: &Found, seldom: &Seldom) -> Verdict {
+    let cell = &found.problem.cells[seldom.cell];
+    let (floor, unit) = (found.floors[seldom.cell], cell_unit(found.robot, cell));
+    let regime = Regime::new(Feature::Time, "in few places".to_owned());
+    let mut location = Location::new(told(cell.channel), vec![cell_name(found.robot, cell)], Subsystem::Unknown, regime);
+    location.energy_share = Some(seldom.share.clamp(0.0, 1.0));
+    location.time_intervals = seldom
+        .stretches
+        .iter()
+        .map(|&(run, [from, to])| {
+            let run = &found.problem.pairs[run].real.run;
+            Interval::new(&run.id, (run.start_s + from).max(0.0), (run.start_s + to).max(0.0))
+        })
+        .collect();
+    let claim = format!(
+        "{:.3e} {unit} RMS where noise alone gives {floor:.1e}, {:.0} % of it in few places: too seldom to be held against other data",
+        seldom.rms,
+        100.0 * seldom.share
+    );
+    Verdict::unmodelled(1, 0.9, location, Evidence::new("size over the noise floor", claim, (seldom.rms, unit), TestMethod::Gate))
+}
+
 /// The verdict of an effect that the vocabulary has no name for.
 fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Verdict {
     let candidate = &effect.chosen.candidate;
@@ -522,6 +549,7 @@ fn remaining(found: &Found) -> Remaining {
         .filter(|e| !e.is_named())
         .map(|e| e.chosen.candidate.family.form)
         .chain(found.controller.map(|_| "tracking error"))
+        .chain(found.seldom.as_ref().map(|_| "time"))
         .collect();
     // Of what was gained, the part that has names.
     let gained = |named: bool| found.answer.effects.iter().filter(|e| !named || e.is_named()).map(|e| e.gain.nats).sum::<f64>();

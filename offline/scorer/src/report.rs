@@ -45,7 +45,7 @@ pub struct Fit {
     /// Before the correction.
     pub before: f64,
     /// What noise alone leaves.
-    pub noise_floor: f64,
+    pub noise_floor: Option<f64>,
     /// Share removed.
     pub removed_fraction: Option<f64>,
 }
@@ -96,7 +96,7 @@ impl Verdict {
 
     /// Share removed where the mismatch stands highest above its floor.
     pub fn removed(&self) -> Option<f64> {
-        let above = |fit: &&Fit| fit.before / fit.noise_floor.max(1e-12);
+        let above = |fit: &&Fit| fit.before / fit.noise_floor.unwrap_or(f64::INFINITY).max(1e-12);
         let fits = self.fit.iter().filter(|fit| fit.removed_fraction.is_some());
         fits.max_by(|a, b| above(a).total_cmp(&above(b))).and_then(|fit| fit.removed_fraction)
     }

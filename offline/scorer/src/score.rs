@@ -178,7 +178,8 @@ fn targets(blocks: &[Group], nulls: &[Nulls], pairs: &[Pairs], outside: &[Outsid
     let mut targets = Vec::new();
     let mut add = |name: &str, level: f64, wanted: [f64; 2], reached: f64, ci95: [f64; 2], of: usize| {
         if of > 0 {
-            let met = (wanted[0]..=wanted[1]).contains(&reached);
+            // A fit may come out below its floor: more than all is removed.
+            let met = (wanted[0]..=wanted[1]).contains(&reached.min(1.0));
             targets.push(Target { name: name.to_owned(), level, wanted, reached, ci95, of, met });
         }
     };

@@ -61,7 +61,8 @@ fn verdict(rank: usize, physics: &str, joint: &[&str], probability: f64, paramet
     let others: Vec<Value> = others.iter().map(|name| json!({"physics": name, "reason": "alike"})).collect();
     json!({"rank": rank, "effect": rank, "role": "primary", "physics": physics, "probability": probability,
            "location": {"joint": joint, "time_intervals": []}, "parameters": parameters,
-           "fit": [{"before": 2.0, "noise_floor": 1.0, "removed_fraction": 0.5}, {"before": 9.0, "noise_floor": 1.0, "removed_fraction": 0.95}],
+           "fit": [{"before": 2.0, "noise_floor": 1.0, "removed_fraction": 0.5}, {"before": 9.0, "noise_floor": 1.0, "removed_fraction": 0.95},
+                   {"before": 99.0, "noise_floor": null}],
            "confusable_with": others})
 }
 

@@ -2,6 +2,7 @@
 
 use crate::common::{Case, Folder, made, named, near, primary, report, wanted, with_effect};
 use gap_report::{Report, Status};
+use generator::order::Wanted;
 use std::path::Path;
 
 #[test]
@@ -13,6 +14,16 @@ fn of_nothing_nothing_is_said() {
     let report = case.judged(&out);
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
     assert!(!out.join("corrected.toml").exists());
+}
+
+#[test]
+fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
+    let folder = Folder::new("wall");
+    let wall = Wanted { physics: "external_contact".to_owned(), severity: Some(10.0), ..Wanted::default() };
+    let (case, _) = made(&folder, "wall", &[wall], 12.0);
+    let report = case.judged(&folder.file("out"));
+    assert_ne!(report.status, Status::NoMismatch, "{}", report.summary);
+    assert!(report.mismatch.detected && !primary(&report).is_empty());
 }
 
 #[test]
