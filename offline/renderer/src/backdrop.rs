@@ -34,6 +34,9 @@ impl Blot {
     }
 }
 
+/// Distance of the places at which clouds are worked out, px.
+const STEP: usize = 8;
+
 /// The wall behind, as one camera sees it: cloudy grey, and blots in and near the colours of the balls.
 pub(crate) fn wall(scene: &Scene, eye: &Eye, random: &mut Random) -> Plate {
     let [width, height] = eye.size_px.map(|n| n as usize);
@@ -59,14 +62,21 @@ pub(crate) fn wall(scene: &Scene, eye: &Eye, random: &mut Random) -> Plate {
             }
         })
         .collect();
+    let cloud_at = |x: f64, y: f64| -> f64 {
+        let one = |[cx, cy, size, depth]: &[f64; 4]| depth * (-((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * size * size)).exp();
+        clouds.iter().map(one).sum()
+    };
+    // Clouds are smooth: every eighth place is worked out, and lines are drawn between.
+    let columns = width / STEP + 2;
+    let coarse: Vec<f64> =
+        (0..columns * (height / STEP + 2)).map(|k| cloud_at((k % columns * STEP) as f64, (k / columns * STEP) as f64)).collect();
     let mut light = Vec::with_capacity(width * height);
     for row in 0..height {
         for column in 0..width {
             let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-            let cloud: f64 = clouds
-                .iter()
-                .map(|[cx, cy, size, depth]| depth * (-((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * size * size)).exp())
-                .sum();
+            let (at, a, b) = (row / STEP * columns + column / STEP, x / STEP as f64 % 1.0, y / STEP as f64 % 1.0);
+            let cloud = (coarse[at] * (1.0 - a) + coarse[at + 1] * a) * (1.0 - b)
+                + (coarse[at + columns] * (1.0 - a) + coarse[at + columns + 1] * a) * b;
             let grey = scene.background * (1.0 + cloud).clamp(0.1, 1.9);
             let mut colour = [grey; 3];
             for blot in &blots {

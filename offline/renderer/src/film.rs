@@ -24,20 +24,23 @@ pub(crate) fn blurred(plate: &Plate, sigma_px: f64) -> Plate {
     let weights: Vec<f32> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sigma_px).powi(2)).exp() as f32).collect();
     let total: f32 = weights.iter().sum();
     let (w, h) = (plate.width as i64, plate.height as i64);
+    // A whole row at a time, shifted: rows beyond the border are the border's.
     let pass = |from: &[[f32; 3]], dx: i64, dy: i64| -> Vec<[f32; 3]> {
-        let mut to = Vec::with_capacity(from.len());
-        for y in 0..h {
-            for x in 0..w {
-                let mut sum = [0.0_f32; 3];
-                for (k, weight) in weights.iter().enumerate() {
-                    let step = k as i64 - reach;
-                    let at = (y + dy * step).clamp(0, h - 1) * w + (x + dx * step).clamp(0, w - 1);
-                    let own = from[at as usize];
-                    for c in 0..3 {
-                        sum[c] += weight * own[c];
-                    }
+        let mut to = vec![[0.0_f32; 3]; from.len()];
+        for (y, row) in to.chunks_exact_mut(plate.width).enumerate() {
+            for (k, weight) in weights.iter().enumerate() {
+                let (step, weight) = (k as i64 - reach, weight / total);
+                let other = (y as i64 + dy * step).clamp(0, h - 1) * w;
+                let line = &from[other as usize..(other + w) as usize];
+                let shift = dx * step;
+                let (least, most) = ((-shift).clamp(0, w), (w - shift).clamp(0, w));
+                let mut add = |x: i64, own: &[f32; 3]| (0..3).for_each(|c| row[x as usize][c] += weight * own[c]);
+                (0..least).for_each(|x| add(x, &line[0]));
+                (most..w).for_each(|x| add(x, &line[(w - 1) as usize]));
+                let inner = row[least as usize..most as usize].iter_mut();
+                for (own, value) in inner.zip(&line[(least + shift) as usize..(most + shift) as usize]) {
+                    (0..3).for_each(|c| own[c] += weight * value[c]);
                 }
-                to.push(sum.map(|v| v / total));
             }
         }
         to

@@ -45,6 +45,18 @@ impl Motion {
         Ok(motion)
     }
 
+    /// A path that turns about, for scenes without a recording: 40 s, 100 mm/s and 80 degrees/s at most.
+    pub fn wandering(seed: u64) -> Self {
+        let phase = seed as f64 * 1.7;
+        let pose = |t: f64| {
+            let along = |size: f64, pace: f64, begun: f64| size * (pace * t + begun + phase).sin();
+            let turn = UnitQuaternion::from_euler_angles(along(0.5, 1.3, 0.5), along(0.4, 0.9, 1.5), along(0.9, 0.7, 0.0) + phase);
+            Isometry3::from_parts(Translation3::new(along(0.035, 1.9, 0.0), along(0.035, 1.5, 1.0), along(0.02, 1.1, 2.0)), turn)
+        };
+        let t_s: Vec<f64> = (0..4000).map(|k| f64::from(k) * 1e-2).collect();
+        Self { poses: t_s.iter().map(|t| pose(*t)).collect(), t_s }
+    }
+
     /// First and last time, s.
     pub fn span_s(&self) -> [f64; 2] {
         [self.t_s[0], self.t_s[self.t_s.len() - 1]]

@@ -92,21 +92,27 @@ impl<'a> Stage<'a> {
     }
 
     fn pixel(&self, eye: &Eye, sights: &Sights, moving: &[Vec<Solid>], column: usize, row: usize, behind: [f32; 3]) -> [f32; 3] {
-        let mut sum = [0.0_f32; 3];
-        for (k, moment) in MOMENTS.iter().enumerate() {
+        // Which solid a sample meets, and its light.
+        let sample = |k: usize| -> (Option<usize>, [f32; 3]) {
             let inside = |n: usize| (n as f64 + 0.5) / SIDE as f64;
             let direction = sights.direction(column, row, inside(k % SIDE), inside(k / SIDE));
-            let nearest = moving[moment % moving.len()]
+            let nearest = moving[MOMENTS[k] % moving.len()]
                 .iter()
-                .filter_map(|solid| solid.hit(&eye.place_m, &direction))
-                .min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-            let light = nearest.map_or(behind, |hit| self.shade(&hit, &direction).map(|v| v as f32));
-            for c in 0..3 {
-                // A sample that is too bright is cut off before it is averaged: highlights have sharp rims.
-                sum[c] += light[c].min(1.5);
-            }
+                .enumerate()
+                .filter_map(|(index, solid)| Some((index, solid.hit(&eye.place_m, &direction)?)))
+                .min_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m));
+            // A sample that is too bright is cut off before it is averaged: highlights have sharp rims.
+            nearest.map_or((None, behind), |(index, hit)| (Some(index), self.shade(&hit, &direction).map(|v| v.min(1.5) as f32)))
+        };
+        let mean = |samples: &[(Option<usize>, [f32; 3])]| {
+            std::array::from_fn(|c| samples.iter().map(|(_, light)| light[c]).sum::<f32>() / samples.len() as f32)
+        };
+        // Most pixels lie within one surface: their corners say all.
+        let corners = [0, SIDE - 1, SIDE * (SIDE - 1), SIDE * SIDE - 1].map(sample);
+        if corners.iter().all(|corner| corner.0 == corners[0].0) {
+            return mean(&corners);
         }
-        sum.map(|v| v / (SIDE * SIDE) as f32)
+        mean(&std::array::from_fn::<_, { SIDE * SIDE }, _>(sample))
     }
 }
 

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let frames: usize = arguments.next().map_or(Ok(12), |text| text.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
     let only: Option<String> = arguments.next();
-    let motion = motion(seed)?;
+    let motion = Motion::wandering(seed);
     for (index, text) in RIGS.iter().enumerate().filter(|(index, _)| only.as_ref().is_none_or(|o| *o == index.to_string())) {
         let scene = Scene::parse("rig", text)?;
         let folder = std::env::temp_dir().join(format!("ravenpose-rigs-{}-{index}", std::process::id()));
@@ -49,20 +49,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     Ok(())
-}
-
-/// A path with turns, some seconds long; 100 mm/s and 80 degrees/s at most.
-fn motion(seed: u64) -> Result<Motion, renderer::Error> {
-    let phase = seed as f64 * 1.7;
-    let t_s: Vec<f64> = (0..4000).map(|k| f64::from(k) * 1e-2).collect();
-    let along = |a: f64, w: f64, p: f64| -> Vec<f64> { t_s.iter().map(|t| a * (w * t + p + phase).sin()).collect() };
-    let (x, y, z) = (along(0.035, 1.9, 0.0), along(0.035, 1.5, 1.0), along(0.02, 1.1, 2.0));
-    let (a, b, c) = (along(0.5, 1.3, 0.5), along(0.4, 0.9, 1.5), along(0.9, 0.7, 0.0));
-    let turns: Vec<nalgebra::Quaternion<f64>> =
-        (0..t_s.len()).map(|k| nalgebra::UnitQuaternion::from_euler_angles(a[k], b[k], c[k] + phase).into_inner()).collect();
-    let part = |pick: fn(&nalgebra::Quaternion<f64>) -> f64| -> Vec<f64> { turns.iter().map(pick).collect() };
-    let (qw, qx, qy, qz) = (part(|q| q.w), part(|q| q.i), part(|q| q.j), part(|q| q.k));
-    Motion::new("path", &t_s, [&x, &y, &z], [&qw, &qx, &qy, &qz])
 }
 
 fn measured(folder: &std::path::Path) -> Result<String, vision::Error> {
