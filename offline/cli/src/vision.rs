@@ -5,6 +5,7 @@ use ::vision::commands::{self, Calibrated};
 use ::vision::marking::Marking;
 use ::vision::marking::server::Server;
 use ::vision::track::{Mode, Tracked};
+use ::vision::video::{self, Source};
 use clap::Subcommand;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -40,6 +41,27 @@ pub(crate) enum Wish {
         #[arg(long)]
         overlay: Option<PathBuf>,
     },
+    /// Frames of a scene from webcams or video files, one per camera
+    Record {
+        /// CAMERA=SOURCE: a name of rig.toml, and /dev/videoN or a video file
+        #[arg(required = true)]
+        sources: Vec<String>,
+        /// Folder with rig.toml
+        #[arg(long)]
+        rig: PathBuf,
+        /// New scene folder to write
+        #[arg(long)]
+        out: PathBuf,
+        /// Stop after so many seconds; needed for webcams
+        #[arg(long)]
+        seconds: Option<f64>,
+        /// Frames of the scene per second
+        #[arg(long, default_value_t = 15.0)]
+        frames_per_s: f64,
+        /// Program for webcams, and for videos other than AVI of Motion JPEG
+        #[arg(long, default_value = "ffmpeg")]
+        ffmpeg: PathBuf,
+    },
     /// Click the markers in the images, on a page of this machine; markers.csv is written with each click
     Mark {
         /// Folder with rig.toml
@@ -74,6 +96,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     match wish {
         Wish::Calibrate { rig, out, paper } => calibrate(rig, out, mode(*paper)),
         Wish::Track { cameras, scene, out, paper, overlay } => track(cameras, scene, out, mode(*paper), overlay.as_deref()),
+        Wish::Record { sources, rig, out, seconds, frames_per_s, ffmpeg } => {
+            record(sources, rig, out, *seconds, *frames_per_s, ffmpeg)
+        }
         Wish::Mark { rig, images, port } => mark(rig, images.as_deref(), *port),
         Wish::Render { run, out, scene, seed, seconds } => render(run, out, scene, *seed, *seconds),
     }
@@ -141,6 +166,43 @@ fn tracked_words(tracked: &Tracked) -> String {
         lines.push(format!("exposure {:.1} ms: poses moved back to its beginning", exposure_s * 1e3));
     }
     lines.join("\n") + "\n"
+}
+
+fn record(
+    sources: &[String],
+    rig: &Path,
+    out: &Path,
+    seconds: Option<f64>,
+    frames_per_s: f64,
+    ffmpeg: &Path,
+) -> Result<ExitCode, String> {
+    let rig = ::vision::rig::read(rig).map_err(|error| error.to_string())?;
+    let names: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let mut opened: Vec<Option<Box<dyn Source>>> = names.iter().map(|_| None).collect();
+    for source in sources {
+        let (name, path) =
+            source.split_once('=').ok_or_else(|| format!("{source}: is not CAMERA=SOURCE; write cam0=/dev/video0"))?;
+        let Some(index) = names.iter().position(|own| *own == name) else {
+            return Err(format!("{source}: camera {name} is not in {}; it holds {}", rig.file.display(), names.join(", ")));
+        };
+        if opened[index].is_some() {
+            return Err(format!("{source}: camera {name} has a source already; give each camera one"));
+        }
+        let own = video::open(Path::new(path), ffmpeg, rig.size_px, frames_per_s).map_err(|error| error.to_string())?;
+        if own.live() && seconds.is_none() {
+            return Err(format!("{source}: a webcam has no end; say how long with --seconds"));
+        }
+        opened[index] = Some(own);
+    }
+    let mut progress = Progress::frames();
+    let made = video::record::record(&rig, opened, frames_per_s, seconds, out, &mut |done, all| {
+        progress.at(done as u64, all.max(done) as u64);
+    });
+    progress.end();
+    let made = made.map_err(|error| error.to_string())?;
+    let images: Vec<String> = names.iter().zip(&made.images).map(|(name, count)| format!("{name} {count}")).collect();
+    say!("{}: {} frames; images: {}", out.display(), made.frames, images.join(", "));
+    Ok(ExitCode::SUCCESS)
 }
 
 fn mark(rig: &Path, images: Option<&Path>, port: u16) -> Result<ExitCode, String> {

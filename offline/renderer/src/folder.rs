@@ -26,7 +26,7 @@ pub struct Rendered {
 }
 
 /// Renders a recording from its first moment on, `seconds` long at most, into a new folder: `rig.toml`, `markers.csv`,
-/// `chessboard/`, `frames.csv`, `frames/`, and for judging only `truth.csv`, `cameras_true.json`, `registration_true.json`.
+/// `chessboard/`, `markers/` (to mark anew), `frames.csv`, `frames/`, and for judging only `truth.csv`, `cameras_true.json`, `registration_true.json`.
 /// Everything follows from scene, motion and `seed`. `progress` is told images done and in all.
 ///
 /// # Errors
@@ -75,6 +75,7 @@ fn all(
         folder(&out.join("frames").join(&station.eye.name))?;
     }
     folder(&out.join("chessboard"))?;
+    folder(&out.join("markers"))?;
     text(&out.join("rig.toml"), &rig_text(scene, &rig))?;
     text(&out.join("markers.csv"), &markers_text(scene, &rig, seed))?;
     text(&out.join("cameras_true.json"), &cameras_text(&rig))?;
@@ -136,6 +137,10 @@ fn images(
         let plain = Scene { tint: [1.0; 3], noise: scene.noise.min(2.0), ..scene.clone() };
         let image = developed(&plate, &plain, &grain, &mut Random::new(seed, 200 + camera as u64));
         picture(&out.join("chessboard").join(format!("{}.jpg", station.eye.name)), &image, scene.jpeg_quality)?;
+        let mut plate = sets[camera].1.clone();
+        stage.paint_markers(&station.eye, &sets[camera].0, rig.markers.iter().map(|marker| marker.true_m), &mut plate);
+        let image = developed(&blurred(&plate, scene.blur_px), scene, &grain, &mut Random::new(seed, 300 + camera as u64));
+        picture(&out.join("markers").join(format!("{}.jpg", station.eye.name)), &image, scene.jpeg_quality)?;
     }
     let total = times_s.len() * rig.stations.len();
     let next = AtomicUsize::new(0);

@@ -75,31 +75,59 @@ impl<'a> Stage<'a> {
         hit.paint.colour.map(|colour| (colour * matt + gloss) * self.scene.brightness)
     }
 
+    /// Paints markers over a plate, as small white balls.
+    pub(crate) fn paint_markers(
+        &self,
+        eye: &Eye,
+        sights: &Sights,
+        places_m: impl Iterator<Item = Vector3<f64>>,
+        plate: &mut Plate,
+    ) {
+        let paint = Paint { colour: [0.9; 3], shine: 0.0 };
+        let solids = vec![places_m.map(|centre_m| Solid::Ball { centre_m, radius_m: 0.002, paint }).collect()];
+        self.paint_solids(eye, sights, &solids, plate);
+    }
+
     /// Paints what moves over a plate.
     pub(crate) fn paint(&self, eye: &Eye, sights: &Sights, t_s: f64, plate: &mut Plate) {
         let exposure_s = self.scene.exposure_ms * 1e-3;
         let moments = if exposure_s > 0.0 { SIDE * SIDE } else { 1 };
         let moving: Vec<Vec<Solid>> =
             (0..moments).map(|k| self.solids(t_s + exposure_s * (k as f64 + 0.5) / moments as f64)).collect();
-        for [x0, y0, x1, y1] in regions(eye, &moving, [plate.width, plate.height]) {
-            for row in y0..y1 {
-                for column in x0..x1 {
+        self.paint_solids(eye, sights, &moving, plate);
+    }
+
+    fn paint_solids(&self, eye: &Eye, sights: &Sights, moving: &[Vec<Solid>], plate: &mut Plate) {
+        for (block, near) in blocks(eye, moving, [plate.width, plate.height]) {
+            for row in block[1]..block[3] {
+                for column in block[0]..block[2] {
                     let own = &mut plate.light[row * plate.width + column];
-                    *own = self.pixel(eye, sights, &moving, column, row, *own);
+                    *own = self.pixel(eye, sights, moving, &near, column, row, *own);
                 }
             }
         }
     }
 
-    fn pixel(&self, eye: &Eye, sights: &Sights, moving: &[Vec<Solid>], column: usize, row: usize, behind: [f32; 3]) -> [f32; 3] {
+    /// Light of a pixel; `near` are the solids that may be seen in it.
+    #[allow(clippy::too_many_arguments, reason = "the innermost loop; a struct for it would be filled once per pixel")]
+    fn pixel(
+        &self,
+        eye: &Eye,
+        sights: &Sights,
+        moving: &[Vec<Solid>],
+        near: &[usize],
+        column: usize,
+        row: usize,
+        behind: [f32; 3],
+    ) -> [f32; 3] {
         // Which solid a sample meets, and its light.
         let sample = |k: usize| -> (Option<usize>, [f32; 3]) {
             let inside = |n: usize| (n as f64 + 0.5) / SIDE as f64;
             let direction = sights.direction(column, row, inside(k % SIDE), inside(k / SIDE));
-            let nearest = moving[MOMENTS[k] % moving.len()]
+            let solids = &moving[MOMENTS[k] % moving.len()];
+            let nearest = near
                 .iter()
-                .enumerate()
-                .filter_map(|(index, solid)| Some((index, solid.hit(&eye.place_m, &direction)?)))
+                .filter_map(|index| Some((*index, solids[*index].hit(&eye.place_m, &direction)?)))
                 .min_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m));
             // A sample that is too bright is cut off before it is averaged: highlights have sharp rims.
             nearest.map_or((None, behind), |(index, hit)| (Some(index), self.shade(&hit, &direction).map(|v| v.min(1.5) as f32)))
@@ -116,30 +144,31 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Parts of the image that anything moving may be seen in, without overlap: columns per strip of rows.
-fn regions(eye: &Eye, moving: &[Vec<Solid>], [width, height]: [usize; 2]) -> Vec<[usize; 4]> {
-    const STRIP: usize = 8;
-    let strips = height.div_ceil(STRIP);
-    let mut spans = vec![Vec::<[usize; 2]>::new(); strips];
-    // Between the first and the last moment nothing goes far: all moments are looked at, they are few.
-    for (centre_m, radius_m) in moving.iter().flatten().flat_map(Solid::bounds) {
-        let Some([x0, y0, x1, y1]) = eye.box_of(&centre_m, radius_m) else { continue };
-        for span in &mut spans[y0 as usize / STRIP..(y1 as usize).div_ceil(STRIP).min(strips)] {
-            span.push([x0 as usize, x1 as usize]);
-        }
-    }
-    let mut all = Vec::new();
-    for (strip, mut own) in spans.into_iter().enumerate() {
-        own.sort_unstable();
-        let rows = [strip * STRIP, ((strip + 1) * STRIP).min(height)];
-        let mut reached = 0;
-        for [from, to] in own {
-            let (from, to) = (from.max(reached), to.min(width));
-            if to > from {
-                all.push([from, rows[0], to, rows[1]]);
-                reached = to;
+/// Side of a block of pixels.
+const BLOCK: usize = 16;
+
+/// Blocks of the image in which anything may be seen, and which solids these are.
+fn blocks(eye: &Eye, moving: &[Vec<Solid>], [width, height]: [usize; 2]) -> Vec<([usize; 4], Vec<usize>)> {
+    let columns = width.div_ceil(BLOCK);
+    let mut near = vec![Vec::<usize>::new(); columns * height.div_ceil(BLOCK)];
+    for (index, (centre_m, radius_m)) in moving
+        .iter()
+        .flat_map(|solids| solids.iter().enumerate())
+        .flat_map(|(index, solid)| solid.bounds().into_iter().map(move |b| (index, b)))
+    {
+        let Some(limits) = eye.box_of(&centre_m, radius_m) else { continue };
+        let [x0, y0, x1, y1] = limits.map(|limit| limit as usize);
+        for row in y0 / BLOCK..y1.div_ceil(BLOCK) {
+            for own in &mut near[row * columns + x0 / BLOCK..row * columns + x1.div_ceil(BLOCK)] {
+                if !own.contains(&index) {
+                    own.push(index);
+                }
             }
         }
     }
-    all
+    let block = |k: usize| {
+        let (x, y) = (k % columns * BLOCK, k / columns * BLOCK);
+        [x, y, (x + BLOCK).min(width), (y + BLOCK).min(height)]
+    };
+    near.into_iter().enumerate().filter(|(_, own)| !own.is_empty()).map(|(k, own)| (block(k), own)).collect()
 }

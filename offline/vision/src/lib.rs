@@ -36,6 +36,7 @@ pub mod timing;
 pub mod track;
 pub mod triangulate;
 pub mod update;
+pub mod video;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::{Error, Result};
