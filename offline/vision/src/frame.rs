@@ -65,11 +65,12 @@ impl Scene<'_> {
     /// Pose out of circles anywhere in the images.
     fn search(&self, images: &[Option<RgbImage>]) -> Result<Isometry3<f64>, Lost> {
         let tolerance = Tolerance::default();
+        let by_camera = each(images, |camera, image| {
+            std::array::from_fn(|ball| image.map_or_else(Vec::new, |image| self.circles(image, camera, ball)))
+        });
         let mut all = [Vec::new(), Vec::new(), Vec::new()];
         for (ball, hypotheses_of_ball) in all.iter_mut().enumerate() {
-            let sightings: Vec<Vec<Sighting>> = (0..self.cameras.len())
-                .map(|camera| images[camera].as_ref().map_or_else(Vec::new, |image| self.circles(image, camera, ball)))
-                .collect();
+            let sightings: Vec<Vec<Sighting>> = by_camera.iter().map(|own: &[Vec<Sighting>; 3]| own[ball].clone()).collect();
             *hypotheses_of_ball = hypotheses(self.cameras, &sightings, self.fixture.ball_radius_m, &tolerance);
             if hypotheses_of_ball.is_empty() {
                 return Err(Lost::Ball(ball));
@@ -99,22 +100,11 @@ impl Scene<'_> {
     /// Rims where an expected pose has them.
     fn guided(&self, images: &[Option<RgbImage>], pose: &Isometry3<f64>, near_px: f64) -> Result<Measured, Lost> {
         let centres = self.fixture.centres_m().map(|centre| pose * Point3::from(centre));
-        // Cameras are independent of one another: a thread each.
-        let by_camera: Vec<[View; 3]> = std::thread::scope(|scope| {
-            let workers: Vec<_> = images
-                .iter()
-                .enumerate()
-                .map(|(camera, image)| {
-                    let centres = &centres;
-                    scope.spawn(move || {
-                        std::array::from_fn(|ball| match image {
-                            None => View::Suspended(Suspended::NoImage),
-                            Some(image) => self.view(image, camera, ball, centres, near_px),
-                        })
-                    })
-                })
-                .collect();
-            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        let by_camera: Vec<[View; 3]> = each(images, |camera, image| {
+            std::array::from_fn(|ball| match image {
+                None => View::Suspended(Suspended::NoImage),
+                Some(image) => self.view(image, camera, ball, &centres, near_px),
+            })
         });
         let mut views: [Vec<View>; 3] = [Vec::new(), Vec::new(), Vec::new()];
         for of_camera in by_camera {
@@ -236,6 +226,16 @@ impl Scene<'_> {
         }
         all
     }
+}
+
+/// What is done with each camera's image; cameras are independent of one another: a thread each.
+fn each<T: Send>(images: &[Option<RgbImage>], work: impl Fn(usize, Option<&RgbImage>) -> T + Sync) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let work = &work;
+        let workers: Vec<_> =
+            images.iter().enumerate().map(|(camera, image)| scope.spawn(move || work(camera, image.as_ref()))).collect();
+        workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    })
 }
 
 /// What is measured too badly is lost.
