@@ -1,7 +1,7 @@
 """Speed and memory of the offline tools: `make bench-offline` (part of `make bench`); `--minutes M` for another length.
 
 Times the simulator in its process (times real time, step, accuracy), then `ravenpose simulate` and conversions as a user runs them:
-seconds, times real time, MB/s of input, peak resident memory.
+seconds, times real time, MB/s of input, peak resident memory. Tracking of four cameras stage by stage.
 """
 import argparse
 import os
@@ -31,6 +31,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=140.0)
     minutes = parser.parse_args().minutes
     subprocess.run([BIN / "examples/speed"], check=True)
+    subprocess.run([BIN / "examples/stages"], check=True)
     folder = pathlib.Path(tempfile.mkdtemp(prefix="ravenpose-bench."))
     try:
         seconds, memory = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--seed", "1", "--robot", "raven2-worn",

@@ -31,6 +31,11 @@ impl Progress {
         Self::new("{bar:40} {pos}/{len} frames, {eta} left")
     }
 
+    /// Images of a rendering.
+    pub(crate) fn images() -> Self {
+        Self::new("{bar:40} {pos}/{len} images, {eta} left")
+    }
+
     fn new(template: &'static str) -> Self {
         Self { begun: Instant::now(), bar: None, template, terminal: std::io::stderr().is_terminal() }
     }

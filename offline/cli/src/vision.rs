@@ -2,7 +2,10 @@
 
 use crate::progress::Progress;
 use ::vision::commands::{self, Calibrated};
+use ::vision::marking::Marking;
+use ::vision::marking::server::Server;
 use ::vision::track::{Mode, Tracked};
+use ::vision::video::{self, Source};
 use clap::Subcommand;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -34,13 +37,70 @@ pub(crate) enum Wish {
         /// Hough circles, midpoints, Nelder-Mead, as in the paper
         #[arg(long)]
         paper: bool,
+        /// Folder for index.html: which circles were found, which were suspended and why
+        #[arg(long)]
+        overlay: Option<PathBuf>,
+    },
+    /// Frames of a scene from webcams or video files, one per camera
+    Record {
+        /// CAMERA=SOURCE: a name of rig.toml, and /dev/videoN or a video file
+        #[arg(required = true)]
+        sources: Vec<String>,
+        /// Folder with rig.toml
+        #[arg(long)]
+        rig: PathBuf,
+        /// New scene folder to write
+        #[arg(long)]
+        out: PathBuf,
+        /// Stop after so many seconds; needed for webcams
+        #[arg(long)]
+        seconds: Option<f64>,
+        /// Frames of the scene per second
+        #[arg(long, default_value_t = 15.0)]
+        frames_per_s: f64,
+        /// Program for webcams, and for videos other than AVI of Motion JPEG
+        #[arg(long, default_value = "ffmpeg")]
+        ffmpeg: PathBuf,
+    },
+    /// Click the markers in the images, on a page of this machine; markers.csv is written with each click
+    Mark {
+        /// Folder with rig.toml
+        rig: PathBuf,
+        /// Folder with NAME.jpg or .png of each camera, else markers/, the first of frames/NAME/, or chessboard/ of the rig
+        #[arg(long)]
+        images: Option<PathBuf>,
+        /// Port of 127.0.0.1; 0 takes any free one
+        #[arg(long, default_value_t = 8470)]
+        port: u16,
+    },
+    /// Camera images of a simulated recording, in the format that calibrate and track read, with the truth beside them
+    Render {
+        /// Recording with the true pose of the end effector (`ravenpose simulate`)
+        run: PathBuf,
+        /// New folder to write
+        #[arg(long)]
+        out: PathBuf,
+        /// easy, occlusion, hard, or a file (docs/vision.md lists its keys)
+        #[arg(long, default_value = "easy")]
+        scene: String,
+        /// Rig, placement errors and noise follow from it
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+        /// Length, from the recording's beginning
+        #[arg(long, default_value_t = 10.0)]
+        seconds: f64,
     },
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     match wish {
         Wish::Calibrate { rig, out, paper } => calibrate(rig, out, mode(*paper)),
-        Wish::Track { cameras, scene, out, paper } => track(cameras, scene, out, mode(*paper)),
+        Wish::Track { cameras, scene, out, paper, overlay } => track(cameras, scene, out, mode(*paper), overlay.as_deref()),
+        Wish::Record { sources, rig, out, seconds, frames_per_s, ffmpeg } => {
+            record(sources, rig, out, *seconds, *frames_per_s, ffmpeg)
+        }
+        Wish::Mark { rig, images, port } => mark(rig, images.as_deref(), *port),
+        Wish::Render { run, out, scene, seed, seconds } => render(run, out, scene, *seed, *seconds),
     }
 }
 
@@ -77,13 +137,17 @@ fn calibrated_words(found: &Calibrated) -> String {
     lines.join("\n") + "\n"
 }
 
-fn track(cameras: &Path, scene: &Path, out: &Path, mode: Mode) -> Result<ExitCode, String> {
+fn track(cameras: &Path, scene: &Path, out: &Path, mode: Mode, overlay: Option<&Path>) -> Result<ExitCode, String> {
     let mut progress = Progress::frames();
     let tracked = commands::track(cameras, scene, mode, &mut |done, all| progress.at(done as u64, all as u64));
     progress.end();
     let tracked = tracked.map_err(|error| error.to_string())?;
     commands::write_truth(&tracked, out).map_err(|error| error.to_string())?;
     let _ = crate::output::say(format_args!("{}", tracked_words(&tracked)));
+    if let Some(folder) = overlay {
+        let page = commands::write_overlay(cameras, scene, &tracked, folder).map_err(|error| error.to_string())?;
+        say!("{}: the frames, with what was found in them", page.display());
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -102,4 +166,75 @@ fn tracked_words(tracked: &Tracked) -> String {
         lines.push(format!("exposure {:.1} ms: poses moved back to its beginning", exposure_s * 1e3));
     }
     lines.join("\n") + "\n"
+}
+
+fn record(
+    sources: &[String],
+    rig: &Path,
+    out: &Path,
+    seconds: Option<f64>,
+    frames_per_s: f64,
+    ffmpeg: &Path,
+) -> Result<ExitCode, String> {
+    let rig = ::vision::rig::read(rig).map_err(|error| error.to_string())?;
+    let names: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let mut opened: Vec<Option<Box<dyn Source>>> = names.iter().map(|_| None).collect();
+    for source in sources {
+        let (name, path) =
+            source.split_once('=').ok_or_else(|| format!("{source}: is not CAMERA=SOURCE; write cam0=/dev/video0"))?;
+        let Some(index) = names.iter().position(|own| *own == name) else {
+            return Err(format!("{source}: camera {name} is not in {}; it holds {}", rig.file.display(), names.join(", ")));
+        };
+        if opened[index].is_some() {
+            return Err(format!("{source}: camera {name} has a source already; give each camera one"));
+        }
+        let own = video::open(Path::new(path), ffmpeg, rig.size_px, frames_per_s).map_err(|error| error.to_string())?;
+        if own.live() && seconds.is_none() {
+            return Err(format!("{source}: a webcam has no end; say how long with --seconds"));
+        }
+        opened[index] = Some(own);
+    }
+    let mut progress = Progress::frames();
+    let made = video::record::record(&rig, opened, frames_per_s, seconds, out, &mut |done, all| {
+        progress.at(done as u64, all.max(done) as u64);
+    });
+    progress.end();
+    let made = made.map_err(|error| error.to_string())?;
+    let images: Vec<String> = names.iter().zip(&made.images).map(|(name, count)| format!("{name} {count}")).collect();
+    say!("{}: {} frames; images: {}", out.display(), made.frames, images.join(", "));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn mark(rig: &Path, images: Option<&Path>, port: u16) -> Result<ExitCode, String> {
+    let marking = Marking::open(rig, images).map_err(|error| error.to_string())?;
+    let file = marking.file();
+    let server = Server::bind(marking, port).map_err(|error| error.to_string())?;
+    say!("{}: open it in a browser of this machine; Finish or Ctrl-C ends", server.url());
+    say!("{}: {} marks", file.display(), server.run());
+    Ok(ExitCode::SUCCESS)
+}
+
+const TRUE_PLACE: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
+const TRUE_TURN: [&str; 4] = ["truth_qw", "truth_qx", "truth_qy", "truth_qz"];
+
+fn render(run: &Path, out: &Path, scene: &str, seed: u64, seconds: f64) -> Result<ExitCode, String> {
+    let scene = renderer::Scene::named(scene).map_err(|error| error.to_string())?;
+    let recording = crate::plot::read(run)?;
+    let column = |name: &str| {
+        recording.column(name).ok_or_else(|| {
+            format!("{}: no column {name}; give a recording of ravenpose simulate, which holds the true pose", run.display())
+        })
+    };
+    let (mut place, mut turn) = ([&[][..]; 3], [&[][..]; 4]);
+    for (own, name) in place.iter_mut().zip(TRUE_PLACE).chain(turn.iter_mut().zip(TRUE_TURN)) {
+        *own = column(name)?;
+    }
+    let motion =
+        renderer::Motion::new(&run.display().to_string(), column("t_s")?, place, turn).map_err(|error| error.to_string())?;
+    let mut progress = Progress::images();
+    let made = renderer::render(&scene, &motion, seed, seconds, out, &mut |done, all| progress.at(done as u64, all as u64));
+    progress.end();
+    let made = made.map_err(|error| error.to_string())?;
+    say!("{}: {} frames of {} cameras, balls in view of two of them in {}", out.display(), made.frames, made.cameras, made.in_view);
+    Ok(ExitCode::SUCCESS)
 }

@@ -70,7 +70,12 @@ fn balanced(rgb: [f32; 3], balance: [f32; 3]) -> [f32; 3] {
 
 /// Factors by which most of what is seen becomes grey: medians of red and blue against green. The balls are a small part of it.
 fn white_balance(pixels: &[[f32; 3]]) -> [f32; 3] {
-    let lit: Vec<&[f32; 3]> = pixels.iter().filter(|rgb| rgb.iter().sum::<f32>() > 60.0 && rgb[1] > 8.0).collect();
+    // In dim light the brighter half says it; what is nearly black says nothing.
+    let mut sums: Vec<f32> = pixels.iter().map(|rgb| rgb.iter().sum()).collect();
+    let middle = sums.len() / 2;
+    let median = if sums.is_empty() { 0.0 } else { *sums.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    let least = median.clamp(18.0, 60.0);
+    let lit: Vec<&[f32; 3]> = pixels.iter().filter(|rgb| rgb.iter().sum::<f32>() > least && rgb[1] > 4.0).collect();
     if lit.len() * 20 < pixels.len() {
         return [1.0; 3];
     }

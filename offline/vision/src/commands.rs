@@ -9,7 +9,7 @@ use crate::rig::{self, Rig};
 use crate::table::read_picks;
 use crate::track::{self, Mode, Tracked};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A calibrated rig.
 #[derive(Debug)]
@@ -120,6 +120,20 @@ pub fn track(cameras: &Path, folder: &Path, mode: Mode, progress: &mut dyn FnMut
     track::track(&cameras, &bearing_px, &rig, folder, mode, progress)
 }
 
+/// Writes `index.html` into a folder: what was found and suspended in the frames of a measured recording ([`crate::overlay`]).
+///
+/// # Errors
+/// If files cannot be read or written.
+pub fn write_overlay(cameras: &Path, folder: &Path, tracked: &Tracked, out: &Path) -> Result<PathBuf> {
+    let rig = rig::read(folder)?;
+    let cameras: Vec<crate::Camera> = cameras_file::read(cameras, &rig)?.into_iter().map(|known| known.camera).collect();
+    let page = crate::overlay::sheet(&cameras, &rig, folder, tracked)?;
+    std::fs::create_dir_all(out).map_err(Error::write(out))?;
+    let file = out.join("index.html");
+    whole(&file, &page)?;
+    Ok(file)
+}
+
 /// Writes `truth.csv`.
 ///
 /// # Errors
@@ -170,7 +184,7 @@ pub fn truth_text(tracked: &Tracked) -> String {
 }
 
 /// A file appears whole or not at all.
-fn whole(file: &Path, text: &str) -> Result<()> {
+pub(crate) fn whole(file: &Path, text: &str) -> Result<()> {
     let aside = file.with_extension(format!("part{}", std::process::id()));
     let written = std::fs::write(&aside, text).and_then(|()| std::fs::rename(&aside, file));
     written.map_err(|error| {

@@ -5,76 +5,13 @@ use crate::camera::Camera;
 use crate::colour::ColourRange;
 use crate::edge::{Cone, colour_at};
 use crate::hough;
-use crate::pose::{Fitted, closed_form, from_bearings};
+use crate::outcome::{Lost, Measured, Suspended, View};
+use crate::pose::{closed_form, from_bearings};
 use crate::rig::Fixture;
 use crate::sphere::{Expectation, OpeningPrior, Sighting, sight};
 use crate::triangulate::{Bearing, Located, weighted, whitened};
 use image::RgbImage;
 use nalgebra::{Isometry3, Matrix2, Point3, Unit, Vector3};
-
-/// Why a camera does not take part in placing a ball.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Suspended {
-    /// No image, or a black one.
-    NoImage,
-    /// No circle was found, or too little of its rim.
-    NotFound,
-    /// Less than a quarter of its border has the ball's colour.
-    Colour,
-    /// It moved further than the ball can.
-    Motion,
-    /// It contradicts the other cameras.
-    Contradicts,
-    /// It has not been consistent for long enough.
-    Returning,
-}
-
-/// One ball in one camera.
-#[derive(Debug, Clone)]
-pub enum View {
-    /// It counts.
-    Effective(Sighting),
-    /// It does not, and why.
-    Suspended(Suspended),
-}
-
-/// A measured frame.
-#[derive(Debug, Clone)]
-pub struct Measured {
-    /// Pose and covariance.
-    pub fitted: Fitted,
-    /// Balls, each from its own circles alone.
-    pub balls: [Located; 3],
-    /// RMS distance between the balls and where the pose has them, m.
-    pub residual_m: f64,
-    /// Views by ball and camera.
-    pub views: [Vec<View>; 3],
-}
-
-/// Why a frame is lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lost {
-    /// Fewer than two cameras have an image.
-    Images,
-    /// A ball has fewer than two effective cameras (its index).
-    Ball(usize),
-    /// The balls found do not stand as the fixture holds them.
-    Fixture,
-    /// What was measured contradicts itself by more than can be trusted.
-    Doubtful,
-}
-
-impl Lost {
-    /// In words; `balls` are the colours in the order of the fixture.
-    pub fn words(&self, balls: &[String; 3]) -> String {
-        match self {
-            Self::Images => "fewer than two cameras have an image".to_owned(),
-            Self::Ball(ball) => format!("fewer than two cameras see the {} ball well enough", balls[*ball % 3]),
-            Self::Fixture => "the balls found do not stand as the fixture holds them".to_owned(),
-            Self::Doubtful => "what was measured contradicts itself".to_owned(),
-        }
-    }
-}
 
 /// What all frames of a recording share.
 #[derive(Debug)]
@@ -128,11 +65,12 @@ impl Scene<'_> {
     /// Pose out of circles anywhere in the images.
     fn search(&self, images: &[Option<RgbImage>]) -> Result<Isometry3<f64>, Lost> {
         let tolerance = Tolerance::default();
+        let by_camera = each(images, |camera, image| {
+            std::array::from_fn(|ball| image.map_or_else(Vec::new, |image| self.circles(image, camera, ball)))
+        });
         let mut all = [Vec::new(), Vec::new(), Vec::new()];
         for (ball, hypotheses_of_ball) in all.iter_mut().enumerate() {
-            let sightings: Vec<Vec<Sighting>> = (0..self.cameras.len())
-                .map(|camera| images[camera].as_ref().map_or_else(Vec::new, |image| self.circles(image, camera, ball)))
-                .collect();
+            let sightings: Vec<Vec<Sighting>> = by_camera.iter().map(|own: &[Vec<Sighting>; 3]| own[ball].clone()).collect();
             *hypotheses_of_ball = hypotheses(self.cameras, &sightings, self.fixture.ball_radius_m, &tolerance);
             if hypotheses_of_ball.is_empty() {
                 return Err(Lost::Ball(ball));
@@ -162,22 +100,11 @@ impl Scene<'_> {
     /// Rims where an expected pose has them.
     fn guided(&self, images: &[Option<RgbImage>], pose: &Isometry3<f64>, near_px: f64) -> Result<Measured, Lost> {
         let centres = self.fixture.centres_m().map(|centre| pose * Point3::from(centre));
-        // Cameras are independent of one another: a thread each.
-        let by_camera: Vec<[View; 3]> = std::thread::scope(|scope| {
-            let workers: Vec<_> = images
-                .iter()
-                .enumerate()
-                .map(|(camera, image)| {
-                    let centres = &centres;
-                    scope.spawn(move || {
-                        std::array::from_fn(|ball| match image {
-                            None => View::Suspended(Suspended::NoImage),
-                            Some(image) => self.view(image, camera, ball, centres, near_px),
-                        })
-                    })
-                })
-                .collect();
-            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        let by_camera: Vec<[View; 3]> = each(images, |camera, image| {
+            std::array::from_fn(|ball| match image {
+                None => View::Suspended(Suspended::NoImage),
+                Some(image) => self.view(image, camera, ball, &centres, near_px),
+            })
         });
         let mut views: [Vec<View>; 3] = [Vec::new(), Vec::new(), Vec::new()];
         for of_camera in by_camera {
@@ -299,6 +226,16 @@ impl Scene<'_> {
         }
         all
     }
+}
+
+/// What is done with each camera's image; cameras are independent of one another: a thread each.
+fn each<T: Send>(images: &[Option<RgbImage>], work: impl Fn(usize, Option<&RgbImage>) -> T + Sync) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let work = &work;
+        let workers: Vec<_> =
+            images.iter().enumerate().map(|(camera, image)| scope.spawn(move || work(camera, image.as_ref()))).collect();
+        workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    })
 }
 
 /// What is measured too badly is lost.

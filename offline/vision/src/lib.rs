@@ -19,7 +19,10 @@ pub mod frame;
 pub mod hough;
 pub mod least_squares;
 pub mod localise;
+pub mod marking;
 pub mod marks;
+pub mod outcome;
+pub mod overlay;
 pub mod paper;
 pub mod picture;
 pub mod plane_pose;
@@ -33,6 +36,7 @@ pub mod timing;
 pub mod track;
 pub mod triangulate;
 pub mod update;
+pub mod video;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::{Error, Result};

@@ -2,8 +2,9 @@
 
 use crate::camera::Camera;
 use crate::edge::Cone;
-use crate::frame::{Lost, Scene, Suspended, border_fraction};
+use crate::frame::{Scene, border_fraction};
 use crate::hough::{self, Circle, Window};
+use crate::outcome::{Lost, Suspended};
 use crate::pose::by_simplex;
 use crate::triangulate::{Ray, mean_of_midpoints};
 use crate::update::RETURN_FRAMES;

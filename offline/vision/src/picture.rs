@@ -88,7 +88,7 @@ pub fn read(file: &Path, size_px: [u32; 2]) -> Result<RgbImage> {
     let bytes = std::fs::read(file).map_err(Error::read(file))?;
     let image = image::load_from_memory(&bytes)
         .map_err(|error| Error::content(file, "image", error.to_string().replace('\n', " "), "give a JPEG or PNG"))?
-        .to_rgb8();
+        .into_rgb8();
     if [image.width(), image.height()] != size_px {
         let what = format!("{} x {} px", image.width(), image.height());
         return Err(Error::content(file, "size", what, format!("rig.toml says {} x {}", size_px[0], size_px[1])));

@@ -126,6 +126,32 @@ pub fn read_objects(file: &Path, cameras: &[String], kind: &str) -> Result<Vec<P
     Ok(picks)
 }
 
+/// Where markers stand, by name.
+pub type Places = std::collections::BTreeMap<String, Point3<f64>>;
+
+/// Reads `marker,x_mm,y_mm,z_mm`: places of markers, marked or not.
+///
+/// # Errors
+/// If a column is absent, a cell is no number, or a marker stands twice.
+pub fn read_places(file: &Path) -> Result<Places> {
+    let rows = Rows::read(file)?;
+    let name_at = rows.column(file, "marker")?;
+    let names = ["x_mm", "y_mm", "z_mm"];
+    let at = [rows.column(file, names[0])?, rows.column(file, names[1])?, rows.column(file, names[2])?];
+    let mut places = Places::new();
+    for (line, cells) in &rows.rows {
+        let mut v = [0.0; 3];
+        for k in 0..3 {
+            v[k] = number(file, *line, names[k], &cells[at[k]])? * 1e-3;
+        }
+        if places.insert(cells[name_at].clone(), Point3::from(v)).is_some() {
+            let what = format!("marker {} stands twice", cells[name_at]);
+            return Err(Error::content(file, format!("line {line}"), what, "keep one of the lines"));
+        }
+    }
+    Ok(places)
+}
+
 /// Reads the frames of a recording.
 ///
 /// # Errors

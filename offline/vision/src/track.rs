@@ -4,7 +4,8 @@ use crate::camera::Camera;
 use crate::colour;
 use crate::edge::Cone;
 use crate::error::{Error, Result};
-use crate::frame::{Lost, Measured, Scene, View};
+use crate::frame::Scene;
+use crate::outcome::{Lost, Measured, View};
 use crate::paper::{PaperFrame, PaperTracker};
 use crate::recording::Recording;
 use crate::rig::{Fixture, Rig};
@@ -200,7 +201,7 @@ pub fn workspace_m(cameras: &[Camera]) -> Option<Point3<f64>> {
 }
 
 /// Least and largest radius of an outline in the work space, per camera.
-fn radius_bounds_px(cameras: &[Camera], fixture: &Fixture) -> Vec<[f64; 2]> {
+pub fn radius_bounds_px(cameras: &[Camera], fixture: &Fixture) -> Vec<[f64; 2]> {
     let middle = workspace_m(cameras).unwrap_or_else(Point3::origin);
     let radius = |camera: &Camera, distance_m: f64| {
         let cone = Cone::of_sphere(&nalgebra::Vector3::new(0.0, 0.0, distance_m), fixture.ball_radius_m);

@@ -4,7 +4,7 @@
 //! of its border in the ball's colour, or contradicts the others. It comes back after five consistent frames (the paper's rule), or at
 //! once where enough circles that were never in doubt confirm it. Bounds on motion widen with each lost frame and narrow again.
 
-use crate::frame::{Suspended, View};
+use crate::outcome::{Suspended, View};
 use nalgebra::{Isometry3, Translation3};
 
 /// Consistent frames after which a suspended circle counts again.

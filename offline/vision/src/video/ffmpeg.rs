@@ -1,0 +1,93 @@
+//! Other videos and webcams through the program ffmpeg, as Motion JPEG on a pipe.
+
+use super::avi::Avi;
+use super::{Shot, Source};
+use crate::error::{Error, Result};
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+struct Piped {
+    path: PathBuf,
+    child: Child,
+    avi: Avi<BufReader<ChildStdout>>,
+    live: bool,
+    shots: u64,
+}
+
+/// A video file of any format.
+pub(super) fn file(path: &Path, program: &Path) -> Result<Box<dyn Source>> {
+    let name = path.display().to_string();
+    start(path, program, &["-i", &name, "-an", "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj444p"], false)
+}
+
+/// A webcam: its own JPEG images, untouched.
+pub(super) fn webcam(path: &Path, program: &Path, [w, h]: [u32; 2], frames_per_s: f64) -> Result<Box<dyn Source>> {
+    let (name, size, rate) = (path.display().to_string(), format!("{w}x{h}"), format!("{frames_per_s}"));
+    let input = ["-f", "v4l2", "-input_format", "mjpeg", "-video_size", &size, "-framerate", &rate, "-i", &name];
+    let mut arguments = vec!["-fflags", "nobuffer"];
+    arguments.extend(input);
+    arguments.extend(["-c:v", "copy", "-flush_packets", "1"]);
+    start(path, program, &arguments, true)
+}
+
+fn start(path: &Path, program: &Path, arguments: &[&str], live: bool) -> Result<Box<dyn Source>> {
+    let mut command = Command::new(program);
+    command.args(["-nostdin", "-v", "error"]).args(arguments).args(["-f", "avi", "-"]);
+    let started = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = started.map_err(|error| {
+        let what = format!("{} is needed for it and cannot be started: {error}", program.display());
+        Error::content(path, "video", what, "install ffmpeg, or give an AVI file of Motion JPEG")
+    })?;
+    let Some(output) = child.stdout.take() else {
+        return Err(Error::content(path, "video", "no pipe from ffmpeg", "try again"));
+    };
+    match Avi::open(path, BufReader::new(output)) {
+        Ok(avi) => Ok(Box::new(Piped { path: path.to_owned(), child, avi, live, shots: 0 })),
+        Err(_) => Err(fault(path, &mut child)),
+    }
+}
+
+/// What the program said, in one line.
+fn fault(path: &Path, child: &mut Child) -> Error {
+    // It may still run if what it sent was no video.
+    drop(child.kill());
+    let mut text = String::new();
+    if let Some(mut stderr) = child.stderr.take() {
+        // Words that cannot be read are not said.
+        drop(stderr.read_to_string(&mut text));
+    }
+    drop(child.wait());
+    let said = text.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("nothing came").to_owned();
+    Error::content(path, "ffmpeg", said, "check that it is a video, or a camera that nobody else uses")
+}
+
+impl Source for Piped {
+    fn next(&mut self) -> Result<Option<Shot>> {
+        match self.avi.next()? {
+            Some(mut shot) => {
+                self.shots += 1;
+                if self.live {
+                    // When it came: webcams send an image as soon as it is read out.
+                    shot.t_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
+                }
+                Ok(Some(shot))
+            }
+            None if self.shots == 0 => Err(fault(&self.path, &mut self.child)),
+            None => Ok(None),
+        }
+    }
+
+    fn live(&self) -> bool {
+        self.live
+    }
+}
+
+impl Drop for Piped {
+    fn drop(&mut self) {
+        // A webcam goes on for ever.
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}

@@ -1,0 +1,62 @@
+//! Video in: files and live webcams, as JPEG images with times ([`record`] makes a scene's frames of them).
+//!
+//! AVI files of Motion JPEG are read here; everything else, webcams included, through the program `ffmpeg`, which hands over the same
+//! kind of AVI on a pipe.
+
+pub mod avi;
+mod ffmpeg;
+pub mod record;
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// An image of a video.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shot {
+    /// When it was taken: since the beginning of a file, or on the clock that all live sources of a recording share.
+    pub t_s: f64,
+    /// A JPEG file's content.
+    pub jpeg: Vec<u8>,
+}
+
+/// Images in the order of their times.
+pub trait Source: Send {
+    /// The next image; `None` at the end.
+    ///
+    /// # Errors
+    /// If the source breaks off in the wrong place.
+    fn next(&mut self) -> Result<Option<Shot>>;
+
+    /// Does it go on by itself, whether anybody reads or not?
+    fn live(&self) -> bool {
+        false
+    }
+}
+
+/// Opens a video file or, under `/dev/`, a webcam. `ffmpeg` is the program for all but AVI files of Motion JPEG; webcams are asked
+/// for images of a size and rate.
+///
+/// # Errors
+/// If it is absent, no video, or the program is needed and not there.
+pub fn open(path: &Path, ffmpeg: &Path, size_px: [u32; 2], frames_per_s: f64) -> Result<Box<dyn Source>> {
+    let webcam = path.starts_with("/dev");
+    if !path.exists() {
+        let kinds = if webcam {
+            "no such device; plug the camera in, ls /dev/video* shows those there are"
+        } else {
+            "no such file; check the path"
+        };
+        let (what, remedy) = kinds.split_once("; ").unwrap_or((kinds, ""));
+        return Err(Error::content(path, "video", what, remedy));
+    }
+    if webcam {
+        return ffmpeg::webcam(path, ffmpeg, size_px, frames_per_s);
+    }
+    let file = File::open(path).map_err(Error::read(path))?;
+    match avi::Avi::open(path, BufReader::new(file)) {
+        Ok(avi) if avi.is_motion_jpeg() => Ok(Box::new(avi)),
+        _ => ffmpeg::file(path, ffmpeg),
+    }
+}
