@@ -144,6 +144,9 @@ enum Command {
         /// Everything follows from it
         #[arg(long, required_unless_present = "commands")]
         seed: Option<u64>,
+        /// What homing leaves follows from this seed and is the same in all runs: the robot is not homed between them
+        #[arg(long)]
+        homing_seed: Option<u64>,
         /// Folder to write run_0001.mcap (or .csv), ... into
         #[arg(long)]
         out: PathBuf,
@@ -213,10 +216,11 @@ fn main() -> ExitCode {
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds } => record::run(&out, seconds),
-        Command::Simulate { minutes, seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
+        Command::Simulate { minutes, seed, homing_seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {
                 minutes,
                 seed,
+                homing_seed,
                 out: &out,
                 robot: robot.as_deref(),
                 commands: &commands,
