@@ -7,6 +7,7 @@ mod output;
 
 mod check;
 mod convert;
+mod evaluate;
 mod gap;
 mod infer;
 mod info;
@@ -17,6 +18,7 @@ mod prove;
 mod record;
 mod simulate;
 mod stats;
+mod train;
 mod vision;
 
 use clap::{Parser, Subcommand};
@@ -172,6 +174,10 @@ enum Command {
         #[arg(long)]
         threads: Option<usize>,
     },
+    /// Learn where the arm really is from recordings with truth: a model file with card, hash and curves
+    Train(train::Wish),
+    /// What a model leaves on runs that it has not seen, rivals beside it: report.json and report.html
+    Evaluate(evaluate::Wish),
     /// Latency histograms and counters of the running service
     Stats {
         /// Show them anew each second until Ctrl-C
@@ -232,6 +238,8 @@ fn main() -> ExitCode {
             })
         }
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
+        Command::Train(wish) => train::run(&wish),
+        Command::Evaluate(wish) => evaluate::run(&wish),
         Command::Vision(wish) => vision::run(&wish),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };

@@ -4,12 +4,19 @@
 //! Nothing here runs in the service: what it runs is the ONNX file that comes out.
 #![deny(missing_docs)]
 
+pub mod card;
+pub mod chain;
+pub mod commands;
 pub mod data;
 pub mod error;
+pub mod evaluate;
+pub mod figures;
 pub mod network;
+pub mod onnx;
 pub mod prepare;
 pub mod preset;
 pub mod random;
+pub mod rivals;
 pub mod split;
 pub mod train;
 

@@ -6,6 +6,7 @@
 use crate::data::Trajectory;
 use crate::error::TrainingError;
 use ndarray::{Array1, Array2};
+use ravenpose_wire::FEATURES;
 use serde::{Deserialize, Serialize};
 
 /// Which map.
@@ -67,12 +68,22 @@ impl Prepared {
     /// # Errors
     /// [`TrainingError::Constant`] if nothing in the inputs changes.
     pub fn fit(trajectories: &[Trajectory], inputs: usize, preparation: Preparation) -> Result<Self, TrainingError> {
-        let sums = match preparation {
+        let sums: Vec<Vec<(usize, f64)>> = match preparation {
             Preparation::Standard => (0..inputs).map(|input| vec![(input, 1.0)]).collect(),
-            Preparation::Physical => physical(),
+            // What is appended to the layout is memory, each a feature of its own.
+            Preparation::Physical => physical().into_iter().chain((FEATURES..inputs).map(|input| vec![(input, 1.0)])).collect(),
         };
         let raw: Vec<Vec<(usize, f64)>> = (0..inputs).map(|input| vec![(input, 1.0)]).collect();
-        let (mean, sd) = statistics(trajectories, inputs, &raw);
+        let (mut mean, mut sd) = statistics(trajectories, inputs, &raw);
+        // The exported normalisation works in float32; the folded bias has to make up for just that.
+        mean.iter_mut().for_each(|mean| *mean = f64::from(*mean as f32));
+        // Both sides of a difference are normalised alike, so that it cancels before anything is rounded.
+        for terms in sums.iter().filter(|terms| terms.len() == 2) {
+            let (a, b) = (terms[0].0, terms[1].0);
+            if sd[b] > 0.0 && sd[a] > 0.0 {
+                (mean[a], sd[a]) = (mean[b], sd[b]);
+            }
+        }
         let (sum_mean, sum_sd) = statistics(trajectories, inputs, &sums);
         let features: Vec<Feature> =
             sums.into_iter().zip(sum_mean.into_iter().zip(sum_sd)).map(|(terms, (mean, sd))| Feature { terms, mean, sd }).collect();
@@ -121,7 +132,7 @@ impl Prepared {
 
     /// Factor of the exported normalisation; 0 where training saw a constant, so that a new constant changes nothing.
     pub fn scale(&self, input: usize) -> f64 {
-        if self.sd[input] > 0.0 { 1.0 / self.sd[input] } else { 0.0 }
+        if self.sd[input] > 0.0 { f64::from((1.0 / self.sd[input]) as f32) } else { 0.0 }
     }
 
     /// Does the network look at this raw input at all?
@@ -171,7 +182,7 @@ fn statistics(trajectories: &[Trajectory], inputs: usize, sums: &[Vec<(usize, f6
 mod tests {
     use super::*;
     use crate::random::Random;
-    use ravenpose_wire::{FEATURES, features};
+    use ravenpose_wire::features;
 
     fn trajectory(rows: usize) -> Trajectory {
         let mut random = Random::new(9, 0);

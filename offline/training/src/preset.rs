@@ -27,6 +27,8 @@ pub struct Recipe {
     pub norm: NormPlace,
     /// What the network sees.
     pub preparation: Preparation,
+    /// Does it want the memory of the recent motion?
+    pub memory: bool,
     /// Rows per step.
     pub batch: usize,
     /// Learning rate of Adam.
@@ -52,6 +54,7 @@ impl Recipe {
             "paper" => Some(Self::paper()),
             "paper-code" => Some(Self::paper_code()),
             "default" => Some(Self::ours()),
+            "memory" => Some(Self { name: name.to_owned(), memory: true, ..Self::ours() }),
             _ => None,
         }
     }
@@ -65,6 +68,7 @@ impl Recipe {
             activation: Activation::Sigmoid,
             norm: NormPlace::Before,
             preparation: Preparation::Standard,
+            memory: false,
             batch: 1024,
             rate: 1e-3,
             schedule: Schedule::Constant,
@@ -87,7 +91,13 @@ impl Recipe {
         }
     }
 
-    /// The best found here: docs/training.md.
+    /// The same for tables, whose columns nobody knows: every one of them standardised.
+    #[must_use]
+    pub fn for_tables(self) -> Self {
+        Self { preparation: Preparation::Standard, memory: false, ..self }
+    }
+
+    /// The best found here for one state: docs/training.md.
     pub fn ours() -> Self {
         Self {
             name: "default".to_owned(),
@@ -95,6 +105,7 @@ impl Recipe {
             activation: Activation::Tanh,
             norm: NormPlace::None,
             preparation: Preparation::Physical,
+            memory: false,
             batch: 256,
             rate: 2e-3,
             schedule: Schedule::Cosine,

@@ -1,11 +1,14 @@
 //! Trajectories: inputs and labels at the moments of a truth, one trajectory per recording.
 
+pub mod memory;
 mod noise;
 mod raven;
 mod table;
 
 use crate::error::TrainingError;
 use crate::random::Random;
+use ravenpose_wire::FEATURES;
+use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 
 pub use noise::add_noise;
@@ -27,6 +30,17 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// What this run is, whatever its name and rate: a hash of its first row without memory and noise.
+    pub fn id(&self) -> String {
+        let width = self.inputs.len() / self.rows().max(1);
+        let outputs = self.exact.len() / self.rows().max(1);
+        let mut hash = Sha256::new();
+        for number in self.inputs.iter().take(width.min(FEATURES)).chain(self.exact.iter().take(outputs)) {
+            hash.update(number.to_le_bytes());
+        }
+        hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time_s.len()
@@ -74,6 +88,8 @@ pub struct Reading {
     pub truth_noise_mm: f64,
     /// Seed of that noise.
     pub seed: u64,
+    /// Append the memory of the recent motion to the inputs of a RAVEN-II.
+    pub memory: bool,
     /// Arm of a RAVEN-II: 0 gold, 1 green.
     pub arm: usize,
     /// Named columns instead of the state of a RAVEN-II.
@@ -82,7 +98,7 @@ pub struct Reading {
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, arm: 0, columns: None }
+        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, memory: false, arm: 0, columns: None }
     }
 }
 
@@ -96,7 +112,7 @@ const NOISE: u64 = 11;
 pub fn read(files: &[PathBuf], reading: &Reading, seen: &mut dyn FnMut(usize, usize)) -> Result<DataSet, TrainingError> {
     let mut data = match &reading.columns {
         Some(columns) => table::empty(columns),
-        None => raven::empty(),
+        None => raven::empty(reading.memory),
     };
     for (index, file) in files.iter().enumerate() {
         let mut trajectory = match &reading.columns {

@@ -1,5 +1,6 @@
 //! A RAVEN-II's recordings: full states with truth become `raven118-v1` and the tip's error in mm.
 
+use super::memory::{self, Memory};
 use super::{DataSet, Reading, Trajectory};
 use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
@@ -14,9 +15,10 @@ const APART_MAX_NS: i64 = 5_000_000;
 const ERROR_MAX_MM: f64 = 100.0;
 
 /// A data set of a RAVEN-II without trajectories.
-pub(super) fn empty() -> DataSet {
+pub(super) fn empty(with_memory: bool) -> DataSet {
+    let memory = if with_memory { memory::names() } else { Vec::new() };
     DataSet {
-        input_names: (0..FEATURES).map(features::name).collect(),
+        input_names: (0..FEATURES).map(features::name).chain(memory).collect(),
         output_names: ["error_x_mm", "error_y_mm", "error_z_mm"].map(str::to_owned).to_vec(),
         is_raven: true,
         ..DataSet::default()
@@ -39,7 +41,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
     let mut source = source;
     loop {
         match source.next().map_err(|error| TrainingError::Recording(error.to_string()))? {
-            Some(Record::State(state)) => pairing.state(&state)?,
+            Some(Record::State(state)) => pairing.state(state),
             Some(Record::Truth(truth)) => pairing.truth(&truth)?,
             None => break,
         }
@@ -57,6 +59,8 @@ struct Pairing<'a> {
     arm: arm::Arm,
     period_ns: i64,
     state: Option<Box<RavenState>>,
+    features: [f32; FEATURES],
+    memory: Option<Memory>,
     state_ns: i64,
     start_ns: Option<i64>,
     next_ns: i64,
@@ -73,6 +77,8 @@ impl<'a> Pairing<'a> {
             arm: Raven2::nominal().arm(side),
             period_ns: (1e9 / reading.truth_hz.max(1e-3)) as i64,
             state: None,
+            features: [0.0; FEATURES],
+            memory: reading.memory.then(Memory::default),
             state_ns: 0,
             start_ns: None,
             next_ns: i64::MIN,
@@ -80,10 +86,14 @@ impl<'a> Pairing<'a> {
         }
     }
 
-    fn state(&mut self, state: &RavenState) -> Result<(), TrainingError> {
-        self.state_ns = Record::State(Box::new(*state)).time_ns();
-        self.state = Some(Box::new(*state));
-        Ok(())
+    fn state(&mut self, state: Box<RavenState>) {
+        let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
+        self.state_ns = stamp_ns;
+        features::extract(&state, self.side.index(), &mut self.features);
+        if let Some(memory) = &mut self.memory {
+            memory.follow(&self.features);
+        }
+        self.state = Some(state);
     }
 
     fn truth(&mut self, truth: &Truth) -> Result<(), TrainingError> {
@@ -94,8 +104,7 @@ impl<'a> Pairing<'a> {
         if (truth.time_ns - self.state_ns).abs() > APART_MAX_NS {
             return Ok(());
         }
-        let mut inputs = [0.0_f32; FEATURES];
-        features::extract(state, self.side.index(), &mut inputs);
+        let inputs = self.features;
         let Some(label) = self.label(state, truth) else { return Ok(()) };
         let start_ns = *self.start_ns.get_or_insert(truth.time_ns);
         let time_s = (truth.time_ns - start_ns) as f64 * 1e-9;
@@ -116,6 +125,9 @@ impl<'a> Pairing<'a> {
         self.next_ns = (self.next_ns + self.period_ns).max(truth.time_ns + self.period_ns / 2);
         self.found.time_s.push(time_s);
         self.found.inputs.extend_from_slice(&inputs);
+        if let Some(memory) = &self.memory {
+            self.found.inputs.extend_from_slice(&memory.places(&inputs));
+        }
         self.found.labels.extend(label.map(|part| part as f32));
         Ok(())
     }
