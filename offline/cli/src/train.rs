@@ -52,7 +52,7 @@ pub(crate) struct Named {
     /// Columns that report the same as --truth, in its order: then truth - reported is learnt
     #[arg(long, num_args = 1.., requires = "truth")]
     reported: Vec<String>,
-    /// Also show the inputs' places within plays of these half widths, as shares of the range that each input has in the first file
+    /// Also learn from where each input stands within plays of these half widths, in the inputs' units (SI where known)
     #[arg(long, num_args = 1.., requires = "inputs")]
     plays: Vec<f64>,
 }
@@ -81,6 +81,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         recipe.epochs = epochs;
     }
     let columns = wish.columns.columns();
+    if let Some(width) = wish.columns.plays.iter().find(|width| !(width.is_finite() && **width > 0.0)) {
+        return Err(format!("--plays {width}: half widths are numbers above 0"));
+    }
     if columns.is_some() {
         recipe = recipe.for_tables();
     }

@@ -15,7 +15,7 @@ pub struct Columns {
     pub truth: Vec<String>,
     /// What is reported of the same quantities: the label is truth - reported. Empty: the label is the truth itself.
     pub reported: Vec<String>,
-    /// Play operators per input: memory of where it came from, at so many widths as shares of its range.
+    /// Play operators on each input, memory of where it came from: half widths in the inputs' units, as read.
     pub plays: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
     let mut found = Trajectory { name, ..Trajectory::default() };
     let mut next_s = f64::NEG_INFINITY;
     let mut left_out = 0;
-    let mut memories = Memories::new(&inputs, &columns.plays);
+    let mut memories = Memories { widths: &columns.plays, held: Vec::new() };
     for row in 0..recording.rows() {
         let time_s = recording.time_s().map_or(row as f64, |time| time[row]);
         let truth_is_there = truth.iter().all(|column| column[row].is_finite());
@@ -129,33 +129,24 @@ fn of_names<'a>(file: &Path, recording: &'a Recording, names: &[String], is_trut
 }
 
 /// Play operators on each input: y follows x where x leaves [y - r, y + r].
-struct Memories {
-    widths: Vec<Vec<f64>>,
+struct Memories<'a> {
+    widths: &'a [f64],
     held: Vec<Vec<f64>>,
 }
 
-impl Memories {
-    fn new(inputs: &[&[f64]], shares: &[f64]) -> Self {
-        let widths = inputs
-            .iter()
-            .map(|column| {
-                let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-                let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                shares.iter().map(|share| share * (high - low).max(0.0)).collect()
-            })
-            .collect();
-        Self { widths, held: Vec::new() }
-    }
-
+impl Memories<'_> {
+    /// The next row; gives x - y of every play.
     fn next(&mut self, values: &[f64]) -> Vec<f64> {
         if self.held.is_empty() {
-            self.held = values.iter().zip(&self.widths).map(|(value, widths)| vec![*value; widths.len()]).collect();
+            self.held = values.iter().map(|value| vec![*value; self.widths.len()]).collect();
         }
-        for ((value, widths), held) in values.iter().zip(&self.widths).zip(&mut self.held) {
-            for (width, held) in widths.iter().zip(held) {
-                *held = held.clamp(value - width, value + width);
+        let mut places = Vec::new();
+        for (value, held) in values.iter().zip(&mut self.held) {
+            for (width, held) in self.widths.iter().zip(held) {
+                *held = held.max(value - width).min(value + width);
+                places.push(value - *held);
             }
         }
-        self.held.concat()
+        places
     }
 }

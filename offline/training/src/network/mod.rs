@@ -208,7 +208,7 @@ impl Layer {
 mod tests {
     use super::*;
 
-    fn loss(network: &mut Network, x: &Array2<f32>) -> f64 {
+    fn loss(network: &Network, x: &Array2<f32>) -> f64 {
         let (y, _) = network.clone().forward_train(x.clone());
         y.iter().enumerate().map(|(i, y)| 0.5 * f64::from(y - (i as f32 * 0.7).sin()).powi(2)).sum()
     }
@@ -217,7 +217,7 @@ mod tests {
     fn gradients_agree_with_differences() {
         for place in [NormPlace::None, NormPlace::Before, NormPlace::After] {
             let mut random = Random::new(4, 0);
-            let mut network = Network::new(&[5, 7, 6, 2], Activation::Tanh, place, &mut random);
+            let network = Network::new(&[5, 7, 6, 2], Activation::Tanh, place, &mut random);
             let x = Array2::from_shape_fn((9, 5), |_| random.normal() as f32);
             let (y, tape) = network.clone().forward_train(x.clone());
             let gradient = Array2::from_shape_fn(y.raw_dim(), |(r, c)| y[[r, c]] - ((r * 2 + c) as f32 * 0.7).sin());
@@ -225,10 +225,10 @@ mod tests {
             for (slot, found) in found.iter().enumerate() {
                 for at in [0, found.len() / 2, found.len() - 1] {
                     let h = 2e-3;
-                    let mut shifted = |by: f32| {
+                    let shifted = |by: f32| {
                         let mut other = network.clone();
                         other.numbers()[slot][at] += by;
-                        loss(&mut other, &x)
+                        loss(&other, &x)
                     };
                     let expected = (shifted(h) - shifted(-h)) / f64::from(2.0 * h);
                     assert!((f64::from(found[at]) - expected).abs() < 3e-3 * expected.abs().max(1.0), "{place:?} {slot} {at}");
