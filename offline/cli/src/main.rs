@@ -7,6 +7,7 @@ mod output;
 
 mod check;
 mod convert;
+mod evaluate;
 mod gap;
 mod infer;
 mod info;
@@ -17,6 +18,7 @@ mod prove;
 mod record;
 mod simulate;
 mod stats;
+mod train;
 mod vision;
 
 use clap::{Parser, Subcommand};
@@ -144,6 +146,9 @@ enum Command {
         /// Everything follows from it
         #[arg(long, required_unless_present = "commands")]
         seed: Option<u64>,
+        /// What homing leaves follows from this seed and is the same in all runs: the robot is not homed between them
+        #[arg(long)]
+        homing_seed: Option<u64>,
         /// Folder to write run_0001.mcap (or .csv), ... into
         #[arg(long)]
         out: PathBuf,
@@ -169,6 +174,10 @@ enum Command {
         #[arg(long)]
         threads: Option<usize>,
     },
+    /// Learn where the arm really is from recordings with truth: a model file with card, hash and curves
+    Train(train::Wish),
+    /// What a model leaves on runs that it has not seen, rivals beside it: report.json and report.html
+    Evaluate(evaluate::Wish),
     /// Latency histograms and counters of the running service
     Stats {
         /// Show them anew each second until Ctrl-C
@@ -213,10 +222,11 @@ fn main() -> ExitCode {
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds } => record::run(&out, seconds),
-        Command::Simulate { minutes, seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
+        Command::Simulate { minutes, seed, homing_seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {
                 minutes,
                 seed,
+                homing_seed,
                 out: &out,
                 robot: robot.as_deref(),
                 commands: &commands,
@@ -228,6 +238,8 @@ fn main() -> ExitCode {
             })
         }
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
+        Command::Train(wish) => train::run(&wish),
+        Command::Evaluate(wish) => evaluate::run(&wish),
         Command::Vision(wish) => vision::run(&wish),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),
     };

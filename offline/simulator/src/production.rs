@@ -32,7 +32,7 @@ pub enum Motion {
 /// What to make.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// The robot; each run homes it anew.
+    /// The robot; each run homes it anew unless [`Plan::homing_seed`] says otherwise.
     pub robot: Robot,
     /// Connected arms.
     pub sides: Vec<Side>,
@@ -42,6 +42,8 @@ pub struct Plan {
     pub run_s: f64,
     /// Everything follows from it.
     pub seed: u64,
+    /// What homing leaves follows from this one instead, the same in every run: the robot stays homed between the runs.
+    pub homing_seed: Option<u64>,
     /// What the arms do.
     pub motion: Motion,
 }
@@ -51,8 +53,10 @@ pub struct Plan {
 pub struct Run {
     /// From 0.
     pub index: usize,
-    /// Seed of homing and motion.
+    /// Seed of motion.
     pub seed: u64,
+    /// Seed of homing.
+    pub homing_seed: u64,
     /// Length, s.
     pub duration_s: f64,
     /// Is it a zig-zag?
@@ -65,15 +69,15 @@ impl Plan {
         let count = (self.duration_s / self.run_s - 1e-9).ceil().max(1.0) as usize;
         let mut random = Random::new(self.seed, 4);
         (0..count)
-            .map(|index| Run {
-                index,
-                seed: (random.share() * (1_u64 << 53) as f64) as u64,
-                duration_s: self.duration_s / count as f64,
-                zigzag: match self.motion {
+            .map(|index| {
+                let seed = (random.share() * (1_u64 << 53) as f64) as u64;
+                let zigzag = match self.motion {
                     Motion::Teleoperation => false,
                     Motion::Zigzag => true,
                     Motion::Mixed => index % 4 == 3,
-                },
+                };
+                let homing_seed = self.homing_seed.unwrap_or(seed);
+                Run { index, seed, homing_seed, duration_s: self.duration_s / count as f64, zigzag }
             })
             .collect()
     }
@@ -139,7 +143,7 @@ impl Player {
             return Err(RobotError::Change("only a RAVEN-II has states".to_owned()).into());
         };
         let first: Joints = std::array::from_fn(|i| commands.first()[i]);
-        let mut simulation = Simulation::new(robot, model.side(), run.seed, &first)?;
+        let mut simulation = Simulation::new(robot, model.side(), run.homing_seed, &first)?;
         match recorded.start_of_raven(model, &commands) {
             Some((motors, speeds)) => simulation.start_at(&motors, &speeds),
             None => simulation.settle(&first, SETTLE_S),
@@ -204,7 +208,8 @@ fn playing(robot: &Robot, side: Side, run: Run) -> Result<Playing, PlantError> {
     let start: Joints = WORKSPACE.map(|(low, high)| random.between(low + 0.3 * (high - low), high - 0.3 * (high - low)));
     let make = if run.zigzag { zigzag } else { teleoperation };
     let trajectory = make(seed, start, &WORKSPACE, run.duration_s);
-    let mut simulation = Simulation::new(robot, side, seed, &start)?;
+    let homing_seed = run.homing_seed ^ (side.index() as u64) << 40;
+    let mut simulation = Simulation::new(robot, side, homing_seed, &start)?;
     simulation.settle(&start, SETTLE_S);
     Ok(Playing { arm, simulation, way: Way::Made(trajectory) })
 }

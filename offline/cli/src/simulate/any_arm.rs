@@ -50,6 +50,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         duration_s: wish.minutes.unwrap_or_default() * 60.0,
         run_s: wish.run_minutes * 60.0,
         seed: wish.seed.unwrap_or_default(),
+        homing_seed: wish.homing_seed,
         motion: Motion::Teleoperation,
     };
     let runs = plan.runs();
@@ -75,7 +76,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
 /// One run; returns what its homing left.
 fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) -> Result<Vector, String> {
     let motion = trajectory(model, run.seed, run.duration_s);
-    let mut simulation = ArmSimulation::new(model, None, run.seed, motion.start()).map_err(|error| error.to_string())?;
+    let mut simulation = ArmSimulation::new(model, None, run.homing_seed, motion.start()).map_err(|error| error.to_string())?;
     simulation.settle(motion.start(), SETTLE_S);
     let (seed, number) = (seed.to_string(), (run.index + 1).to_string());
     let period_s = simulation.period_s();

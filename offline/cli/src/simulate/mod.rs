@@ -13,6 +13,7 @@ use std::process::ExitCode;
 pub(crate) struct Wish<'a> {
     pub(crate) minutes: Option<f64>,
     pub(crate) seed: Option<u64>,
+    pub(crate) homing_seed: Option<u64>,
     pub(crate) out: &'a Path,
     pub(crate) robot: Option<&'a str>,
     pub(crate) commands: &'a [PathBuf],

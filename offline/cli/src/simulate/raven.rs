@@ -38,6 +38,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         duration_s: wish.minutes.unwrap_or_default() * 60.0,
         run_s: wish.run_minutes * 60.0,
         seed: wish.seed.unwrap_or_default(),
+        homing_seed: wish.homing_seed,
         motion: match wish.motion {
             "teleoperation" => Motion::Teleoperation,
             "zigzag" => Motion::Zigzag,
@@ -58,7 +59,8 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         write(&mut player, model.name(), &metadata, &files[index], watch)?;
         Ok(offsets)
     })?;
-    let mut text = format!("robot = {}\nseed = {}\nruns = {}\n", model.name(), plan.seed, runs.len());
+    let homing = plan.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"));
+    let mut text = format!("robot = {}\nseed = {}\n{homing}runs = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offsets) in runs.iter().zip(&files).zip(&offsets) {
         let _ = write!(text, "{}: {:.3} s, {}", name(file), run.duration_s, motion_of(*run));
         for (side, offset) in plan.sides.iter().zip(offsets) {
@@ -83,7 +85,8 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
         .enumerate()
         .map(|(index, run)| {
             let duration_s = run.time_s[run.len() - 1] - run.time_s[0] + 1e-3;
-            Run { index, seed: wish.seed.unwrap_or_default(), duration_s, zigzag: false }
+            let seed = wish.seed.unwrap_or_default();
+            Run { index, seed, homing_seed: wish.homing_seed.unwrap_or(seed), duration_s, zigzag: false }
         })
         .collect();
     let total = runs.iter().map(Run::cycles).sum();

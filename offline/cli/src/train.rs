@@ -1,0 +1,148 @@
+//! `ravenpose train`: from recordings with truth to a model file.
+
+use crate::output;
+use ::training::commands::{self, Done, Event};
+use ::training::data::{Columns, Reading};
+use ::training::preset::Recipe;
+use clap::Args;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What to learn from, and how.
+#[derive(Args)]
+pub(crate) struct Wish {
+    /// Recordings with truth, one whole trajectory each
+    #[arg(long, required = true, num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// ONNX file to write; FILE.sha256 and FILE.curves.svg go beside it
+    #[arg(long)]
+    out: PathBuf,
+    /// Recipe
+    #[arg(long, default_value = "default", value_parser = ["default", "memory", "paper", "paper-code"])]
+    preset: String,
+    /// Everything random: split, weights, order of rows
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Passes over the training rows, instead of the preset's
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// At most so many rows per second of truth
+    #[arg(long, default_value_t = 30.0)]
+    truth_hz: f64,
+    /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, mm
+    #[arg(long, default_value_t = 0.0)]
+    truth_noise: f64,
+    /// Arm of a RAVEN-II
+    #[arg(long, default_value = "gold", value_parser = ["gold", "green"])]
+    arm: String,
+    #[command(flatten)]
+    columns: Named,
+}
+
+/// Columns of tables that are no RAVEN-II's states.
+#[derive(Args)]
+pub(crate) struct Named {
+    /// Columns of a table that are the inputs, instead of a RAVEN-II's state
+    #[arg(long, num_args = 1.., requires = "truth")]
+    inputs: Vec<String>,
+    /// Columns that are the truth
+    #[arg(long, num_args = 1.., requires = "inputs")]
+    truth: Vec<String>,
+    /// Columns that report the same as --truth, in its order: then truth - reported is learnt
+    #[arg(long, num_args = 1.., requires = "truth")]
+    reported: Vec<String>,
+    /// Also learn from where each input stands within plays of these half widths, in the inputs' units (SI where known)
+    #[arg(long, num_args = 1.., requires = "inputs")]
+    plays: Vec<f64>,
+}
+
+impl Named {
+    pub(crate) fn columns(&self) -> Option<Columns> {
+        (!self.inputs.is_empty()).then(|| Columns {
+            inputs: self.inputs.clone(),
+            truth: self.truth.clone(),
+            reported: self.reported.clone(),
+            plays: self.plays.clone(),
+        })
+    }
+}
+
+pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
+    if !(wish.truth_hz > 0.0 && wish.truth_hz <= 1000.0) {
+        return Err(format!("--truth-hz {}: must be above 0 and at most 1000; write --truth-hz 30", wish.truth_hz));
+    }
+    if !(0.0..=100.0).contains(&wish.truth_noise) {
+        return Err(format!("--truth-noise {}: must be from 0 to 100 mm; write --truth-noise 0.5", wish.truth_noise));
+    }
+    let mut recipe = Recipe::preset(&wish.preset).ok_or_else(|| format!("--preset {}: no such recipe", wish.preset))?;
+    recipe.seed = wish.seed;
+    if let Some(epochs) = wish.epochs {
+        recipe.epochs = epochs;
+    }
+    let columns = wish.columns.columns();
+    if let Some(width) = wish.columns.plays.iter().find(|width| !(width.is_finite() && **width > 0.0)) {
+        return Err(format!("--plays {width}: half widths are numbers above 0"));
+    }
+    if columns.is_some() {
+        recipe = recipe.for_tables();
+    }
+    let reading = Reading {
+        truth_hz: wish.truth_hz,
+        truth_noise_mm: wish.truth_noise,
+        seed: wish.seed,
+        memory: recipe.memory,
+        arm: usize::from(wish.arm == "green"),
+        columns,
+    };
+    let wanted = commands::Wish { data: &wish.data, reading: &reading, recipe: &recipe, out: &wish.out };
+    let terminal = std::io::stderr().is_terminal();
+    let done = commands::train(&wanted, &mut |event| told(event, terminal)).map_err(|error| error.to_string())?;
+    if terminal {
+        output::complain(format_args!("\r\x1b[K"));
+    }
+    for note in &done.notes {
+        complain!("ravenpose: {note}");
+    }
+    let _ = output::say(format_args!("{}", words(wish, &done)));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// On a terminal one line that changes; elsewhere a line for every tenth epoch.
+fn told(event: &Event, terminal: bool) {
+    match event {
+        Event::Read(done, all) if terminal => output::complain(format_args!("\r\x1b[K{done} of {all} recordings read")),
+        Event::Read(..) => {}
+        Event::Epoch(progress) => {
+            let point = progress.point;
+            let line = format!(
+                "epoch {} of {}: {:.3} left on training, {:.3} on validation; {:.1} s each, {:.0} s left",
+                point.epoch, progress.epochs, point.train_rms, point.validation_rms, progress.epoch_s, progress.left_s
+            );
+            if terminal {
+                output::complain(format_args!("\r\x1b[K{line}"));
+            } else if point.epoch % 10 == 1 || point.epoch == progress.epochs {
+                complain!("{line}");
+            }
+        }
+    }
+}
+
+fn words(wish: &Wish, done: &Done) -> String {
+    let [train, validation, test] = done.trajectories;
+    let bounds: Vec<String> = done.bounds.iter().map(|bound| format!("{bound:.3}")).collect();
+    format!(
+        "{}: {} numbers learnt from {} rows of {train} trajectories in {:.0} s\n\
+         validation ({validation} trajectories): {:.3} {} RMS left in epoch {}; 95 % bound per axis {}\n\
+         test ({test} trajectories, {} rows): not read; `ravenpose evaluate` with the same --data does\n",
+        wish.out.display(),
+        done.weights,
+        done.rows[0],
+        done.seconds,
+        done.validation_rms,
+        done.unit,
+        done.epoch,
+        bounds.join(" "),
+        done.rows[2]
+    )
+}

@@ -1,0 +1,206 @@
+//! The model card as metadata: what a network may be used for, in the form that `docs/models.md` lays down.
+
+use crate::chain::Chain;
+use crate::data::{Trajectory, memory};
+use crate::prepare::Prepared;
+use ravenpose_wire::{FEATURES, features};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Units that the service asks for.
+const UNITS: &str = "raven_state as published; position error in mm";
+/// Coverage that the bound is stated for.
+pub const COVERAGE: f64 = 0.95;
+/// The range of a feature is widened by this share of itself on both sides: an unseen trajectory of the same kind leaves the
+/// extremes of a finite sample now and then.
+const RANGE_MARGIN: f64 = 0.05;
+/// Share of the validation rows that lie within the limit of the domain, and room beyond it.
+const DOMAIN_SHARE: f64 = 0.999;
+const DOMAIN_ROOM: f64 = 1.1;
+/// Golden pairs in a card.
+const GOLDEN: usize = 8;
+/// Room of the correction bound beyond the largest estimate seen.
+const BOUND_ROOM: f64 = 1.25;
+/// What `dt` can be at all: the network does not look at it, and it varies from machine to machine.
+const DT_RANGE: (f32, f32) = (0.0, 0.1);
+/// 97.5 % quantile of the normal distribution.
+const NORMAL_975: f64 = 1.959_964;
+
+/// What a card is made of.
+pub struct Facts<'a> {
+    /// The exported network.
+    pub chain: &'a Chain,
+    /// Are the inputs `raven118-v1`, perhaps with a memory behind them? The card speaks of the layout's 118 only: what a memory
+    /// adds is bounded by itself.
+    pub is_raven: bool,
+    /// What it looks at.
+    pub prepared: &'a Prepared,
+    /// Trajectories of training.
+    pub train: &'a [Trajectory],
+    /// Trajectories that the bound and the limit of the domain are taken from.
+    pub validation: &'a [Trajectory],
+    /// In words: data, split, recipe.
+    pub trained_on: &'a str,
+    /// Known noise of the truth, 3D, mm; 0 where it is not known, which makes the bound wider than need be.
+    pub truth_noise_mm: f64,
+    /// Further properties.
+    pub more: BTreeMap<String, String>,
+}
+
+/// Half width per output that holds the true value with [`COVERAGE`]: split conformal on whole trajectories that took no part in
+/// the learning, each of which counts the same. The truth's own noise, where it is known, is taken out as a variance.
+pub fn bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec<f64> {
+    let outputs = chain.outputs();
+    let noise = NORMAL_975 * truth_noise / (outputs.max(1) as f64).sqrt();
+    (0..outputs)
+        .map(|output| {
+            let mut weighted: Vec<(f64, f64)> = validation
+                .iter()
+                .flat_map(|one| {
+                    let estimates = chain.estimate(&one.inputs);
+                    let weight = 1.0 / one.rows().max(1) as f64;
+                    let rest =
+                        move |row: usize| f64::from(one.labels[row * outputs + output] - estimates[row * outputs + output]).abs();
+                    (0..one.rows()).map(|row| (rest(row), weight)).collect::<Vec<_>>()
+                })
+                .collect();
+            let measured = quantile(&mut weighted, COVERAGE);
+            (measured * measured - noise * noise).max(0.0).sqrt()
+        })
+        .collect()
+}
+
+/// The smallest value with at least this share of the weight at or below it.
+fn quantile(weighted: &mut [(f64, f64)], share: f64) -> f64 {
+    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = weighted.iter().map(|(_, weight)| weight).sum();
+    let mut sum = 0.0;
+    for (value, weight) in weighted.iter() {
+        sum += weight;
+        if sum >= share * total {
+            return *value;
+        }
+    }
+    weighted.last().map_or(0.0, |(value, _)| *value)
+}
+
+/// All properties of a model.
+pub fn card(facts: &Facts) -> BTreeMap<String, String> {
+    let mut card = facts.more.clone();
+    let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
+    let is_raven = facts.is_raven;
+    put("trained_on", facts.trained_on.to_owned());
+    if is_raven {
+        put("feature_layout", features::LAYOUT.to_owned());
+        put("units", UNITS.to_owned());
+        if facts.chain.inputs() > FEATURES {
+            put("memory", memory::property());
+        }
+        let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
+            facts
+                .chain
+                .estimate(&one.inputs)
+                .chunks_exact(3)
+                .map(|e| e.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt())
+                .collect::<Vec<_>>()
+        });
+        put("correction_bound_mm", format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
+    }
+    let (low, high) = ranges(facts, is_raven);
+    let stated = if is_raven { FEATURES } else { facts.chain.inputs() };
+    put("feature_min", words(&low[..stated]));
+    put("feature_max", words(&high[..stated]));
+    let (center, weight, limit) = domain(facts);
+    put("domain_center", words(&center[..stated]));
+    put("domain_weight", words(&weight[..stated]));
+    put("domain_limit", limit.to_string());
+    put("bound95_mm", words(&bounds(facts.chain, facts.validation, facts.truth_noise_mm)));
+    put("golden", golden(facts));
+    card
+}
+
+fn words<T: std::fmt::Display>(numbers: &[T]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Range of each input in training and validation, widened where it moves. A constant stays exact: other encoder offsets mean
+/// another homing, whose static error this model cannot know.
+fn ranges(facts: &Facts, is_raven: bool) -> (Vec<f32>, Vec<f32>) {
+    let inputs = facts.chain.inputs();
+    let (mut low, mut high) = (vec![f32::INFINITY; inputs], vec![f32::NEG_INFINITY; inputs]);
+    for row in facts.train.iter().chain(facts.validation).flat_map(|one| one.inputs.chunks_exact(inputs.max(1))) {
+        for ((low, high), value) in low.iter_mut().zip(&mut high).zip(row) {
+            *low = low.min(*value);
+            *high = high.max(*value);
+        }
+    }
+    for (low, high) in low.iter_mut().zip(&mut high) {
+        let margin = (RANGE_MARGIN * f64::from(*high - *low)) as f32;
+        *low -= margin;
+        *high += margin;
+    }
+    if is_raven {
+        (low[features::DT], high[features::DT]) = DT_RANGE;
+    }
+    (low, high)
+}
+
+/// Centre, weights and limit of the distance: standardised inputs that the network looks at.
+fn domain(facts: &Facts) -> (Vec<f32>, Vec<f32>, f32) {
+    let inputs = facts.chain.inputs();
+    let center = facts.chain.shift.clone();
+    let weight: Vec<f32> = (0..inputs)
+        .map(|input| {
+            let counts = facts.prepared.uses(input) && !(facts.is_raven && input >= FEATURES);
+            if counts { facts.chain.scale[input] } else { 0.0 }
+        })
+        .collect();
+    let distance =
+        |row: &[f32]| row.iter().zip(&center).zip(&weight).map(|((x, c), w)| f64::from((x - c) * w).powi(2)).sum::<f64>().sqrt();
+    let rows = facts.validation.iter().flat_map(|one| one.inputs.chunks_exact(inputs.max(1)));
+    let mut distances: Vec<(f64, f64)> = rows.map(|row| (distance(row), 1.0)).collect();
+    let limit = (DOMAIN_ROOM * quantile(&mut distances, DOMAIN_SHARE)).max(f64::from(f32::MIN_POSITIVE));
+    (center, weight, limit as f32)
+}
+
+/// Rows spread over training with what the network gives for them.
+fn golden(facts: &Facts) -> String {
+    let inputs = facts.chain.inputs().max(1);
+    let rows: Vec<&[f32]> = facts.train.iter().flat_map(|one| one.inputs.chunks_exact(inputs)).collect();
+    let mut text = String::new();
+    for k in 0..GOLDEN.min(rows.len()) {
+        let mut row = rows[k * rows.len() / GOLDEN.min(rows.len())].to_vec();
+        let stated = if facts.is_raven { FEATURES } else { inputs };
+        // A memory that has seen nothing but this state.
+        row[stated..].fill(0.0);
+        let _ = writeln!(text, "{} {}", words(&row[..stated]), words(&facts.chain.estimate_exactly(&row)));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::Dense;
+    use crate::network::Activation;
+    use crate::random::Random;
+    use ndarray::Array2;
+
+    #[test]
+    fn the_bound_holds_19_of_20_true_values_though_the_truth_is_noisy() {
+        let mut random = Random::new(8, 0);
+        let layer = Dense { weight: Array2::zeros((3, 1)), bias: vec![0.0; 3], activation: Activation::Identity };
+        let chain = Chain { shift: vec![0.0], scale: vec![1.0], layers: vec![layer] };
+        let (n, sd, noise) = (40_000, 0.6, 0.5);
+        let exact: Vec<f32> = (0..3 * n).map(|_| (sd * random.normal()) as f32).collect();
+        let mut one =
+            Trajectory { time_s: vec![0.0; n], inputs: vec![0.0; n], labels: exact.clone(), exact, ..Trajectory::default() };
+        crate::data::add_noise(&mut one, 3, noise, &mut random);
+        let bounds = bounds(&chain, std::slice::from_ref(&one), noise);
+        for (output, bound) in bounds.iter().enumerate() {
+            let inside = one.exact.iter().skip(output).step_by(3).filter(|value| f64::from(value.abs()) <= *bound).count();
+            let share = inside as f64 / n as f64;
+            assert!((share - COVERAGE).abs() < 0.01, "{share}");
+        }
+    }
+}

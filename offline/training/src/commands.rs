@@ -1,0 +1,221 @@
+//! `ravenpose train` without its words: from recordings to a model file with its card, its hash, its curves.
+
+use crate::card::{self, Facts};
+use crate::chain::Chain;
+use crate::data::{self, DataSet, Reading, Trajectory, memory};
+use crate::error::{TrainingError, shown};
+use crate::preset::Recipe;
+use crate::split::{Parts, Split};
+use crate::train::{self, Progress};
+use crate::{figures, onnx};
+use ravenpose_wire::FEATURES;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What is to be trained.
+#[derive(Debug, Clone)]
+pub struct Wish<'a> {
+    /// Recordings, one trajectory each.
+    pub data: &'a [PathBuf],
+    /// How they are read.
+    pub reading: &'a Reading,
+    /// How it is learnt.
+    pub recipe: &'a Recipe,
+    /// ONNX file to write; hash, curves and checkpoint stand beside it.
+    pub out: &'a Path,
+}
+
+/// What is going on.
+#[derive(Debug, Clone)]
+pub enum Event {
+    /// So many recordings of so many are read.
+    Read(usize, usize),
+    /// An epoch is done.
+    Epoch(Progress),
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub struct Done {
+    /// Rows of training, validation and test.
+    pub rows: [usize; 3],
+    /// Trajectories of each.
+    pub trajectories: [usize; 3],
+    /// Least RMS on validation, against the truth as measured.
+    pub validation_rms: f64,
+    /// In which epoch.
+    pub epoch: usize,
+    /// Half widths of 95 %.
+    pub bounds: Vec<f64>,
+    /// Wall time of learning, s.
+    pub seconds: f64,
+    /// Numbers that were learnt.
+    pub weights: usize,
+    /// What was assumed or left out.
+    pub notes: Vec<String>,
+    /// Unit of the outputs.
+    pub unit: &'static str,
+}
+
+/// Trains and writes the model. The test trajectories stay sealed.
+///
+/// # Errors
+/// [`TrainingError`]: data, checkpoint, or files that cannot be written.
+pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
+    let mut set = data::read(wish.data, wish.reading, &mut |done, all| told(&Event::Read(done, all)))?;
+    refuse_twins(&set)?;
+    let split = Split::draw(set.trajectories.len(), wish.recipe.seed)?;
+    let all_rows: Vec<usize> = set.trajectories.iter().map(Trajectory::rows).collect();
+    let count = |part: &[usize]| part.iter().map(|index| all_rows[*index]).sum();
+    let rows = [count(&split.train), count(&split.validation), count(&split.test)];
+    let trajectories = [split.train.len(), split.validation.len(), split.test.len()];
+    let parts = Parts::of(&mut set, &split);
+    let checkpoint = beside(wish.out, "checkpoint");
+    let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
+    let trained = train::train(&parts.train, &parts.validation, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
+    let chain = Chain::of(&trained);
+    let best = trained.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
+    let (epoch, validation_rms) = best.map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
+    let facts = Facts {
+        chain: &chain,
+        is_raven: set.is_raven,
+        prepared: &trained.prepared,
+        train: &parts.train,
+        validation: &parts.validation,
+        trained_on: &trained_on(wish, rows, trajectories, &set),
+        truth_noise_mm: wish.reading.truth_noise_mm,
+        more: more(wish, &parts, &set),
+    };
+    let card = card::card(&facts);
+    let unit = if set.is_raven { "mm" } else { "units of the truth" };
+    write_model(wish.out, &chain, &card)?;
+    write_whole(&beside(wish.out, "curves.svg"), figures::curves_svg(&trained.curves, unit).as_bytes())?;
+    drop(fs::remove_file(&checkpoint));
+    Ok(Done {
+        rows,
+        trajectories,
+        validation_rms,
+        epoch,
+        bounds: card::bounds(&chain, &parts.validation, wish.reading.truth_noise_mm),
+        seconds: trained.seconds,
+        weights: chain.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum(),
+        notes: set.notes,
+        unit,
+    })
+}
+
+/// The same run given twice would be in two sets.
+fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
+    let mut seen = BTreeMap::new();
+    for one in &set.trajectories {
+        if let Some(other) = seen.insert(one.id(), &one.name) {
+            return Err(TrainingError::Unfit {
+                file: one.name.clone(),
+                what: format!("begins exactly as {other} does: the same run twice"),
+                remedy: "give each run once, or it would be in training and test at a time",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// FILE.EXTENSION beside a model.
+fn beside(model: &Path, extension: &str) -> PathBuf {
+    let mut name = model.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    PathBuf::from(name)
+}
+
+fn trained_on(wish: &Wish, rows: [usize; 3], trajectories: [usize; 3], set: &DataSet) -> String {
+    let minutes: f64 = rows.iter().sum::<usize>() as f64 / wish.reading.truth_hz / 60.0;
+    let kind = if set.is_raven { "RAVEN-II recordings" } else { "tables" };
+    format!(
+        "{} {kind}, {} rows ({minutes:.1} minutes at {} Hz); truth noise {} mm added; whole trajectories split {}/{}/{} \
+         (training/validation/test); preset {}, seed {}",
+        trajectories.iter().sum::<usize>(),
+        rows.iter().sum::<usize>(),
+        wish.reading.truth_hz,
+        wish.reading.truth_noise_mm,
+        trajectories[0],
+        trajectories[1],
+        trajectories[2],
+        wish.recipe.name,
+        wish.recipe.seed
+    )
+}
+
+/// Which runs took part in what, and how they were read: for `evaluate`.
+fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
+    let ids = |set: &[Trajectory]| set.iter().map(Trajectory::id).collect::<Vec<_>>().join(" ");
+    let recipe = serde_json::to_string(wish.recipe).unwrap_or_default();
+    let mut more = BTreeMap::from([
+        ("ravenpose.train_runs".to_owned(), ids(&parts.train)),
+        ("ravenpose.validation_runs".to_owned(), ids(&parts.validation)),
+        ("ravenpose.truth_hz".to_owned(), wish.reading.truth_hz.to_string()),
+        ("ravenpose.truth_noise_mm".to_owned(), wish.reading.truth_noise_mm.to_string()),
+        ("ravenpose.recipe".to_owned(), recipe),
+    ]);
+    if !set.is_raven {
+        more.insert("ravenpose.inputs".to_owned(), set.input_names.join(" "));
+        more.insert("ravenpose.outputs".to_owned(), set.output_names.join(" "));
+    }
+    more
+}
+
+fn write_model(out: &Path, chain: &Chain, card: &BTreeMap<String, String>) -> Result<(), TrainingError> {
+    let bytes = onnx::write(chain, card);
+    let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    write_whole(out, &bytes)?;
+    write_whole(&beside(out, "sha256"), format!("{digest}  {name}\n").as_bytes())
+}
+
+/// Writes a file aside and renames it.
+pub(crate) fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), TrainingError> {
+    let aside = beside(file, "new");
+    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, file));
+    written.map_err(|error| {
+        drop(fs::remove_file(&aside));
+        TrainingError::file(file, format!("cannot be written: {error}"), "choose another --out")
+    })
+}
+
+/// A model that [`train`] wrote.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Its network.
+    pub chain: Chain,
+    /// Its card.
+    pub card: BTreeMap<String, String>,
+}
+
+impl Model {
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// [`TrainingError::Model`] for what is not a model of this crate.
+    pub fn read(file: &Path) -> Result<Self, TrainingError> {
+        let wrong = |what: String| TrainingError::Model { file: shown(file), what };
+        let bytes = fs::read(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+        let (chain, card) = onnx::read(&bytes).map_err(wrong)?;
+        Ok(Self { chain, card })
+    }
+
+    /// Does it want the memory of the recent motion behind the 118 features?
+    pub fn has_memory(&self) -> bool {
+        self.chain.inputs() == FEATURES + memory::MEMORY
+    }
+
+    /// A property of the card as a number.
+    pub fn number(&self, key: &str) -> Option<f64> {
+        self.card.get(key)?.trim().parse().ok()
+    }
+
+    /// A property of the card as words.
+    pub fn words(&self, key: &str) -> Vec<&str> {
+        self.card.get(key).map(|text| text.split_ascii_whitespace().collect()).unwrap_or_default()
+    }
+}

@@ -1,0 +1,130 @@
+//! Trajectories: inputs and labels at the moments of a truth, one trajectory per recording.
+
+pub mod memory;
+mod noise;
+mod raven;
+mod table;
+
+use crate::error::TrainingError;
+use crate::random::Random;
+use ravenpose_wire::FEATURES;
+use sha2::{Digest, Sha256};
+use std::path::PathBuf;
+
+pub use noise::add_noise;
+pub use table::Columns;
+
+/// One whole run. Rows are moments with truth.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trajectory {
+    /// Name of its file.
+    pub name: String,
+    /// Time of each row, s.
+    pub time_s: Vec<f64>,
+    /// Row-major, [`DataSet::inputs`] numbers per row, units as in the file.
+    pub inputs: Vec<f32>,
+    /// Row-major, [`DataSet::outputs`] numbers per row: what a model is to give, as the truth says (mm for a RAVEN-II).
+    pub labels: Vec<f32>,
+    /// The same without the noise that was added; equal to `labels` where none was.
+    pub exact: Vec<f32>,
+}
+
+impl Trajectory {
+    /// What this run is, whatever its name and rate: a hash of its first row without memory and noise.
+    pub fn id(&self) -> String {
+        let width = self.inputs.len() / self.rows().max(1);
+        let outputs = self.exact.len() / self.rows().max(1);
+        let mut hash = Sha256::new();
+        for number in self.inputs.iter().take(width.min(FEATURES)).chain(self.exact.iter().take(outputs)) {
+            hash.update(number.to_le_bytes());
+        }
+        hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time_s.len()
+    }
+}
+
+/// Recordings as trajectories with the same inputs and outputs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DataSet {
+    /// Names of the inputs.
+    pub input_names: Vec<String>,
+    /// Names of the outputs, with their unit.
+    pub output_names: Vec<String>,
+    /// Are the inputs `raven118-v1` and the outputs the tip's error in mm?
+    pub is_raven: bool,
+    /// One per recording, in the order given.
+    pub trajectories: Vec<Trajectory>,
+    /// What was assumed or left out, in words.
+    pub notes: Vec<String>,
+}
+
+impl DataSet {
+    /// Numbers per row of inputs.
+    pub fn inputs(&self) -> usize {
+        self.input_names.len()
+    }
+
+    /// Numbers per row of labels.
+    pub fn outputs(&self) -> usize {
+        self.output_names.len()
+    }
+
+    /// Rows of all trajectories.
+    pub fn rows(&self) -> usize {
+        self.trajectories.iter().map(Trajectory::rows).sum()
+    }
+}
+
+/// How recordings become trajectories.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// At most so many rows per second of truth.
+    pub truth_hz: f64,
+    /// Standard deviation in 3D of the noise that is added to the truth, mm: for simulated runs, whose truth is exact.
+    pub truth_noise_mm: f64,
+    /// Seed of that noise.
+    pub seed: u64,
+    /// Append the memory of the recent motion to the inputs of a RAVEN-II.
+    pub memory: bool,
+    /// Arm of a RAVEN-II: 0 gold, 1 green.
+    pub arm: usize,
+    /// Named columns instead of the state of a RAVEN-II.
+    pub columns: Option<Columns>,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, memory: false, arm: 0, columns: None }
+    }
+}
+
+/// Purpose of the stream of random numbers that noise is drawn from.
+const NOISE: u64 = 11;
+
+/// Reads recordings, one trajectory each; `seen` hears how many are done.
+///
+/// # Errors
+/// [`TrainingError`] for files that cannot be read, have no truth, contradict their header or hold NaN.
+pub fn read(files: &[PathBuf], reading: &Reading, seen: &mut dyn FnMut(usize, usize)) -> Result<DataSet, TrainingError> {
+    let mut data = match &reading.columns {
+        Some(columns) => table::empty(columns),
+        None => raven::empty(reading.memory),
+    };
+    for (index, file) in files.iter().enumerate() {
+        let mut trajectory = match &reading.columns {
+            Some(columns) => table::read(file, columns, reading.truth_hz, &mut data.notes)?,
+            None => raven::read(file, reading, &mut data.notes)?,
+        };
+        if reading.truth_noise_mm > 0.0 {
+            let mut random = Random::new(reading.seed.wrapping_add(index as u64), NOISE);
+            add_noise(&mut trajectory, data.output_names.len(), reading.truth_noise_mm, &mut random);
+        }
+        data.trajectories.push(trajectory);
+        seen(index + 1, files.len());
+    }
+    Ok(data)
+}

@@ -1,0 +1,175 @@
+//! A RAVEN-II's recordings: full states with truth become `raven118-v1` and the tip's error in mm.
+
+use super::memory::{self, Memory};
+use super::{DataSet, Reading, Trajectory};
+use crate::error::{TrainingError, shown};
+use arm::{Raven2, Side};
+use ravenpose_wire::{FEATURES, RavenState, features};
+use recordings::open::{Opened, open};
+use recordings::stream::{Record, Truth};
+use std::path::Path;
+
+/// A truth further from every state than this belongs to none: half a period of the slowest recordings (100 Hz).
+const APART_MAX_NS: i64 = 5_000_000;
+/// No arm of half a metre is off by more: units or frames contradict each other then.
+const ERROR_MAX_MM: f64 = 100.0;
+
+/// A data set of a RAVEN-II without trajectories.
+pub(super) fn empty(with_memory: bool) -> DataSet {
+    let memory = if with_memory { memory::names() } else { Vec::new() };
+    DataSet {
+        input_names: (0..FEATURES).map(features::name).chain(memory).collect(),
+        output_names: ["error_x_mm", "error_y_mm", "error_z_mm"].map(str::to_owned).to_vec(),
+        is_raven: true,
+        ..DataSet::default()
+    }
+}
+
+/// Reads one recording of states.
+pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> Result<Trajectory, TrainingError> {
+    let source = match open(file).map_err(|error| TrainingError::Recording(error.to_string()))? {
+        Opened::States(source) => source,
+        Opened::Table(_) => {
+            return Err(TrainingError::Unfit {
+                file: shown(file),
+                what: "is a table, not a recording of RAVEN-II states".to_owned(),
+                remedy: "name its columns with --inputs and --truth",
+            });
+        }
+    };
+    let mut pairing = Pairing::new(file, reading);
+    let mut source = source;
+    loop {
+        match source.next().map_err(|error| TrainingError::Recording(error.to_string()))? {
+            Some(Record::State(state)) => pairing.state(state),
+            Some(Record::Truth(truth)) => pairing.truth(&truth)?,
+            None => break,
+        }
+    }
+    if let Some(damage) = source.damage() {
+        notes.push(format!("{}: {}: {}: what stands before it is used", shown(file), damage.place, damage.what));
+    }
+    pairing.finish()
+}
+
+/// The state being held until its truth comes.
+struct Pairing<'a> {
+    file: &'a Path,
+    side: Side,
+    arm: arm::Arm,
+    period_ns: i64,
+    state: Option<Box<RavenState>>,
+    features: [f32; FEATURES],
+    memory: Option<Memory>,
+    state_ns: i64,
+    start_ns: Option<i64>,
+    next_ns: i64,
+    found: Trajectory,
+}
+
+impl<'a> Pairing<'a> {
+    fn new(file: &'a Path, reading: &Reading) -> Self {
+        let side = if reading.arm == 0 { Side::Gold } else { Side::Green };
+        let name = file.file_name().map_or_else(|| shown(file), |name| name.to_string_lossy().into_owned());
+        Self {
+            file,
+            side,
+            arm: Raven2::nominal().arm(side),
+            period_ns: (1e9 / reading.truth_hz.max(1e-3)) as i64,
+            state: None,
+            features: [0.0; FEATURES],
+            memory: reading.memory.then(Memory::default),
+            state_ns: 0,
+            start_ns: None,
+            next_ns: i64::MIN,
+            found: Trajectory { name, ..Trajectory::default() },
+        }
+    }
+
+    fn state(&mut self, state: Box<RavenState>) {
+        let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
+        self.state_ns = stamp_ns;
+        features::extract(&state, self.side.index(), &mut self.features);
+        if let Some(memory) = &mut self.memory {
+            memory.follow(&self.features);
+        }
+        self.state = Some(state);
+    }
+
+    fn truth(&mut self, truth: &Truth) -> Result<(), TrainingError> {
+        if truth.side != self.side || truth.time_ns < self.next_ns {
+            return Ok(());
+        }
+        let Some(state) = self.state.as_deref() else { return Ok(()) };
+        if (truth.time_ns - self.state_ns).abs() > APART_MAX_NS {
+            return Ok(());
+        }
+        let inputs = self.features;
+        let Some(label) = self.label(state, truth) else { return Ok(()) };
+        let start_ns = *self.start_ns.get_or_insert(truth.time_ns);
+        let time_s = (truth.time_ns - start_ns) as f64 * 1e-9;
+        if let Some(feature) = inputs.iter().position(|value| !value.is_finite()) {
+            return Err(self.unfit(
+                format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature)),
+                "remove the row or record again",
+            ));
+        }
+        if label.iter().any(|part| part.abs() > ERROR_MAX_MM) {
+            let what = format!("truth and reported tip are {:.0} mm apart {time_s:.3} s after the first truth", norm(&label));
+            return Err(
+                self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm")
+            );
+        }
+        // The next one a period after where this one should have been: rates keep their mean.
+        self.next_ns = if self.next_ns == i64::MIN { truth.time_ns } else { self.next_ns };
+        self.next_ns = (self.next_ns + self.period_ns).max(truth.time_ns + self.period_ns / 2);
+        self.found.time_s.push(time_s);
+        self.found.inputs.extend_from_slice(&inputs);
+        if let Some(memory) = &self.memory {
+            self.found.inputs.extend_from_slice(&memory.places(&inputs));
+        }
+        self.found.labels.extend(label.map(|part| part as f32));
+        Ok(())
+    }
+
+    /// True minus reported tip, mm, frame 0; none where the truth does not say.
+    fn label(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
+        let at = 3 * self.side.index();
+        let reported_m: [f64; 3] = std::array::from_fn(|axis| f64::from(state.pos[at + axis]) * 1e-6);
+        if truth.position_m.iter().all(|part| part.is_finite()) {
+            return Some(std::array::from_fn(|axis| (truth.position_m[axis] - reported_m[axis]) * 1e3));
+        }
+        // Encoders at joints 1 to 3 (the lab's 252 columns): the tip that they and the reported tool joints make.
+        if truth.joints[..3].iter().all(|part| part.is_finite()) {
+            let mut joints = reported_joints(state, self.side);
+            let before = self.arm.kinematics.tip_position(&joints);
+            joints[..3].copy_from_slice(&truth.joints[..3]);
+            let after = self.arm.kinematics.tip_position(&joints);
+            return Some(std::array::from_fn(|axis| (after[axis] - before[axis]) * 1e3));
+        }
+        None
+    }
+
+    fn unfit(&self, what: String, remedy: &'static str) -> TrainingError {
+        TrainingError::Unfit { file: shown(self.file), what, remedy }
+    }
+
+    fn finish(mut self) -> Result<Trajectory, TrainingError> {
+        if self.found.rows() == 0 {
+            let looked_for = format!("no true tip and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
+            return Err(TrainingError::NoTruth { file: shown(self.file), looked_for });
+        }
+        self.found.exact = self.found.labels.clone();
+        Ok(self.found)
+    }
+}
+
+/// Joint positions as published (degrees in every slot, joint 3 included), in rad and m.
+fn reported_joints(state: &RavenState, side: Side) -> arm::Joints {
+    const SLOTS: [usize; arm::JOINTS] = [0, 1, 2, 4, 5, 6, 7];
+    SLOTS.map(|slot| f64::from(state.jpos[8 * side.index() + slot]).to_radians())
+}
+
+fn norm(vector: &[f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}

@@ -1,0 +1,69 @@
+//! How often the bound that the card states holds, and how often its domain is left: computed as the service does.
+
+use super::{Rest, Trust};
+use crate::commands::Model;
+use crate::data::Trajectory;
+
+/// Inputs named in the report at most.
+const LEAVING: usize = 6;
+
+/// Judges bound and domain on trajectories with the model's estimates.
+pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], names: &[String]) -> Trust {
+    let numbers = |key: &str| -> Vec<f64> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
+    let bound95 = numbers("ravenpose.bound95_mm");
+    let mut trust = Trust { bound95, ..Trust::default() };
+    coverage(&mut trust, test, estimates);
+    let (low, high) = (numbers("ravenpose.feature_min"), numbers("ravenpose.feature_max"));
+    let (center, weight) = (numbers("ravenpose.domain_center"), numbers("ravenpose.domain_weight"));
+    let limit = model.number("ravenpose.domain_limit").unwrap_or(f64::INFINITY);
+    let inputs = model.chain.inputs().max(1);
+    let mut left = vec![0_usize; low.len()];
+    let (mut rows, mut outside, mut beyond) = (0_usize, 0_usize, 0_usize);
+    for row in test.iter().flat_map(|one| one.inputs.chunks_exact(inputs)) {
+        rows += 1;
+        let mut inside = true;
+        for (((value, low), high), left) in row.iter().zip(&low).zip(&high).zip(&mut left) {
+            if !(f64::from(*value) >= *low && f64::from(*value) <= *high) {
+                *left += 1;
+                inside = false;
+            }
+        }
+        outside += usize::from(!inside);
+        let squares: f64 = row.iter().zip(&center).zip(&weight).map(|((x, c), w)| ((f64::from(*x) - c) * w).powi(2)).sum();
+        beyond += usize::from(squares.sqrt() > limit);
+    }
+    let share = |count: usize| 100.0 * count as f64 / rows.max(1) as f64;
+    (trust.out_of_range, trust.out_of_domain) = (share(outside), share(beyond));
+    let mut leaving: Vec<(String, f64)> =
+        left.iter().zip(names).filter(|(count, _)| **count > 0).map(|(count, name)| (name.clone(), share(*count))).collect();
+    leaving.sort_by(|a, b| b.1.total_cmp(&a.1));
+    leaving.truncate(LEAVING);
+    trust.leaving = leaving;
+    trust
+}
+
+fn coverage(trust: &mut Trust, test: &[Trajectory], estimates: &[Rest]) {
+    let outputs = trust.bound95.len();
+    if outputs == 0 {
+        return;
+    }
+    let mut inside = vec![0_usize; outputs];
+    let (mut rows, mut lowest, mut highest) = (0_usize, 100.0_f64, 0.0_f64);
+    for (one, estimate) in test.iter().zip(estimates) {
+        let mut held = 0;
+        for (truth, estimate) in one.exact.chunks_exact(outputs).zip(estimate.chunks_exact(outputs)) {
+            for (axis, bound) in trust.bound95.iter().enumerate() {
+                if f64::from((truth[axis] - estimate[axis]).abs()) <= *bound {
+                    inside[axis] += 1;
+                    held += 1;
+                }
+            }
+        }
+        rows += one.rows();
+        let share = 100.0 * f64::from(held) / (one.rows() * outputs).max(1) as f64;
+        (lowest, highest) = (lowest.min(share), highest.max(share));
+    }
+    trust.coverage = inside.iter().map(|count| 100.0 * *count as f64 / rows.max(1) as f64).collect();
+    trust.coverage_all = trust.coverage.iter().sum::<f64>() / outputs as f64;
+    trust.coverage_of_runs = (lowest, highest);
+}

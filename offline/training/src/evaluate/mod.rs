@@ -1,0 +1,257 @@
+//! Evaluation on whole trajectories that took no part in training, with the rivals beside the model.
+
+mod breakdown;
+mod domain;
+mod metrics;
+mod page;
+
+use crate::commands::{Model, write_whole};
+use crate::data::{self, Reading, Trajectory};
+use crate::error::{TrainingError, shown};
+use crate::rivals;
+use metrics::{AllFigures, Interval, Rest};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+pub use breakdown::Cell;
+pub use metrics::{Figures, figures, reductions};
+
+/// What is to be evaluated.
+#[derive(Debug, Clone)]
+pub struct Wish<'a> {
+    /// Model file.
+    pub model: &'a Path,
+    /// Recordings: those of training and validation are recognised and only learnt from, all others are judged on.
+    pub data: &'a [PathBuf],
+    /// How they are read; rate, noise and memory are the model's own.
+    pub reading: &'a Reading,
+    /// Run the rivals too.
+    pub rivals: bool,
+    /// Folder for report.json and report.html.
+    pub out: &'a Path,
+    /// Of bootstrap and rivals.
+    pub seed: u64,
+}
+
+/// One way to correct, with what it leaves.
+#[derive(Debug, Clone, Serialize)]
+pub struct Method {
+    /// Name.
+    pub name: String,
+    /// What it is and whose.
+    pub what: String,
+    /// Time of learning, s; none where nothing is learnt here.
+    pub train_s: Option<f64>,
+    /// Time of one estimate here, µs, many rows at a time.
+    pub estimate_us: Option<f64>,
+    /// What is left against the truth without added noise.
+    pub exact: AllFigures,
+    /// What is left against the truth as measured.
+    pub measured: AllFigures,
+    /// RMS of the vector after the best offset per run, against the truth without added noise.
+    pub centred_rms: f64,
+    /// RMS removed, percent, against the truth without added noise.
+    pub rms_reduction: Interval,
+    /// SD removed, percent.
+    pub sd_reduction: Interval,
+    /// RMS after the best offset per run against the same of raw, percent removed.
+    pub centred_reduction: Interval,
+}
+
+/// How often the stated bound and the trained domain hold.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Trust {
+    /// Stated half widths.
+    pub bound95: Vec<f64>,
+    /// Share of rows within it per axis, percent, against the truth without added noise.
+    pub coverage: Vec<f64>,
+    /// The same over all axes.
+    pub coverage_all: f64,
+    /// Lowest and highest of a trajectory over all axes, percent.
+    pub coverage_of_runs: (f64, f64),
+    /// Rows with an input outside its trained range, percent.
+    pub out_of_range: f64,
+    /// Rows beyond the trained domain, percent.
+    pub out_of_domain: f64,
+    /// Inputs that left their range most often, with the share of rows, percent.
+    pub leaving: Vec<(String, f64)>,
+}
+
+/// The whole report.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// Format of this file.
+    pub format: &'static str,
+    /// Model file.
+    pub model: String,
+    /// What it was trained on, as its card says.
+    pub trained_on: String,
+    /// Names of outputs.
+    pub outputs: Vec<String>,
+    /// Names of the runs judged on.
+    pub runs: Vec<String>,
+    /// Rows of them.
+    pub rows: usize,
+    /// Runs that took part in training or validation and were only given to the rivals.
+    pub runs_of_training: usize,
+    /// Raw first, then the model, then the rivals.
+    pub methods: Vec<Method>,
+    /// Bound and domain.
+    pub trust: Trust,
+    /// RMS of the vector before and after by region, speed, direction and load.
+    pub breakdown: Vec<Cell>,
+    /// Of the bootstrap and the rivals.
+    pub seed: u64,
+    /// What was assumed or left out.
+    pub notes: Vec<String>,
+}
+
+/// What a run is to a model.
+fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajectory>, usize) {
+    let (train, validation) = (model.words("ravenpose.train_runs"), model.words("ravenpose.validation_runs"));
+    let (mut learnt, mut unseen, mut known) = (Vec::new(), Vec::new(), 0);
+    for one in all {
+        let id = one.id();
+        if train.contains(&id.as_str()) {
+            known += 1;
+            learnt.push(one);
+        } else if validation.contains(&id.as_str()) {
+            known += 1;
+        } else {
+            unseen.push(one);
+        }
+    }
+    (learnt, unseen, known)
+}
+
+/// Evaluates and writes report.json and report.html; `told` hears what is being done.
+///
+/// # Errors
+/// [`TrainingError`]: model, data, or a folder that cannot be written.
+pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
+    let model = Model::read(wish.model)?;
+    let reading = Reading {
+        truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
+        truth_noise_mm: model.number("ravenpose.truth_noise_mm").unwrap_or(0.0),
+        memory: model.has_memory(),
+        ..wish.reading.clone()
+    };
+    let set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
+    if set.inputs() != model.chain.inputs() || set.outputs() != model.chain.outputs() {
+        let what = format!(
+            "maps {} inputs to {} outputs, the recordings have {} and {}",
+            model.chain.inputs(),
+            model.chain.outputs(),
+            set.inputs(),
+            set.outputs()
+        );
+        return Err(TrainingError::Model { file: shown(wish.model), what });
+    }
+    let outputs = set.outputs();
+    let (train, test, known) = parts(&model, set.trajectories);
+    if test.is_empty() {
+        return Err(TrainingError::Unfit {
+            file: shown(wish.model),
+            what: format!("all {known} recordings took part in its training or validation"),
+            remedy: "give runs that it has not seen",
+        });
+    }
+    let judge = Judge::new(&test, outputs, wish.seed);
+    let mut methods = vec![judge.raw(), judge.fixed_offset()];
+    told("the model");
+    let begun = Instant::now();
+    let estimates: Vec<Rest> = test.iter().map(|one| model.chain.estimate(&one.inputs)).collect();
+    let estimate_us = begun.elapsed().as_secs_f64() * 1e6 / judge.rows() as f64;
+    methods.push(judge.method("model", "this model file", &estimates, None, Some(estimate_us)));
+    if wish.rivals && !train.is_empty() {
+        // Rivals see the 118 features alone: the memory is the model's.
+        for (name, what, mut rival) in rivals::all(set.is_raven, set.input_names.len(), wish.seed) {
+            told(name);
+            let begun = Instant::now();
+            rival.fit(&train, outputs);
+            let train_s = begun.elapsed().as_secs_f64();
+            let begun = Instant::now();
+            let found: Vec<Rest> = test.iter().map(|one| rival.estimate(one)).collect();
+            let estimate_us = begun.elapsed().as_secs_f64() * 1e6 / judge.rows() as f64;
+            methods.push(judge.method(name, what, &found, Some(train_s), Some(estimate_us)));
+        }
+    }
+    let report = Report {
+        format: "ravenpose-evaluation/1",
+        model: shown(wish.model),
+        trained_on: model.card.get("ravenpose.trained_on").cloned().unwrap_or_default(),
+        outputs: set.output_names.clone(),
+        runs: test.iter().map(|one| one.name.clone()).collect(),
+        rows: judge.rows(),
+        runs_of_training: known,
+        methods,
+        trust: domain::trust(&model, &test, &estimates, &set.input_names),
+        breakdown: if set.is_raven { breakdown::cells(&test, &estimates) } else { Vec::new() },
+        seed: wish.seed,
+        notes: set.notes,
+    };
+    std::fs::create_dir_all(wish.out)
+        .map_err(|error| TrainingError::file(wish.out, format!("cannot be made: {error}"), "choose another --out"))?;
+    let json = serde_json::to_string_pretty(&report)
+        .map_err(|error| TrainingError::file(wish.out, format!("cannot hold the report: {error}"), "choose another --out"))?;
+    write_whole(&wish.out.join("report.json"), json.as_bytes())?;
+    let unit = if set.is_raven { "mm" } else { "units of the truth" };
+    write_whole(&wish.out.join("report.html"), page::page(&report, &test, &estimates, unit).as_bytes())?;
+    Ok(report)
+}
+
+/// The test trajectories with their truths.
+struct Judge<'a> {
+    test: &'a [Trajectory],
+    outputs: usize,
+    seed: u64,
+    exact: Vec<Rest>,
+}
+
+impl<'a> Judge<'a> {
+    fn new(test: &'a [Trajectory], outputs: usize, seed: u64) -> Self {
+        Self { test, outputs, seed, exact: test.iter().map(|one| one.exact.clone()).collect() }
+    }
+
+    fn rows(&self) -> usize {
+        self.test.iter().map(Trajectory::rows).sum()
+    }
+
+    fn raw(&self) -> Method {
+        let zeros: Vec<Rest> = self.exact.iter().map(|one| vec![0.0; one.len()]).collect();
+        self.method("raw", "as reported", &zeros, None, None)
+    }
+
+    /// The mean of each run's own truth: nothing constant can do better.
+    fn fixed_offset(&self) -> Method {
+        let means: Vec<Rest> = self
+            .exact
+            .iter()
+            .zip(metrics::centred(&self.exact, self.outputs))
+            .map(|(exact, centred)| exact.iter().zip(centred).map(|(exact, centred)| exact - centred).collect())
+            .collect();
+        self.method("fixed offset per run", "the best one, from the run's own truth", &means, None, None)
+    }
+
+    fn method(&self, name: &str, what: &str, estimates: &[Rest], train_s: Option<f64>, estimate_us: Option<f64>) -> Method {
+        let minus =
+            |truth: &[f32], estimate: &Rest| truth.iter().zip(estimate).map(|(truth, estimate)| truth - estimate).collect::<Rest>();
+        let exact: Vec<Rest> = self.test.iter().zip(estimates).map(|(one, estimate)| minus(&one.exact, estimate)).collect();
+        let measured: Vec<Rest> = self.test.iter().zip(estimates).map(|(one, estimate)| minus(&one.labels, estimate)).collect();
+        let (before, after) = (metrics::centred(&self.exact, self.outputs), metrics::centred(&exact, self.outputs));
+        let (rms_reduction, sd_reduction) = reductions(&self.exact, &exact, self.outputs, self.seed);
+        Method {
+            name: name.to_owned(),
+            what: what.to_owned(),
+            train_s,
+            estimate_us,
+            centred_rms: figures(&after, self.outputs).vector.rms,
+            exact: figures(&exact, self.outputs),
+            measured: figures(&measured, self.outputs),
+            rms_reduction,
+            sd_reduction,
+            centred_reduction: reductions(&before, &after, self.outputs, self.seed).0,
+        }
+    }
+}
