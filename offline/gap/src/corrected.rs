@@ -11,7 +11,7 @@ use arm::serial::{LinkInertia, PARAMETERS};
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{Candidate, normals};
+use crate::hypothesis::{Candidate, direction};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -197,8 +197,9 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }),
         ("payload" | "gravity_direction" | "frame_misalignment", _) => Bound::Robot,
         ("external_contact", _) => {
-            let normal = candidate.shape_of("normal").and_then(|k| normals().get(k as usize).copied());
-            let normal = normal.ok_or("a force without a wall is not a term of the simulator")?;
+            let angles = candidate.shape_of("azimuth").zip(candidate.shape_of("elevation"));
+            let (azimuth, elevation) = angles.ok_or("a force without a wall is not a term of the simulator")?;
+            let normal = direction(azimuth, elevation);
             let _ = parameters.0.insert("n".to_owned(), Value::Vector(normal.as_slice().to_vec()));
             Bound::Robot
         }

@@ -69,6 +69,9 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
                     }
                     let mut shape = best.shape.clone();
                     shape[k] = there;
+                    if let Some(carry) = &family.carry {
+                        carry(&best.shape, &mut shape);
+                    }
                     try_one(Candidate::new(dictionary, family, &shape, best.window), &mut best, &mut least, misfit);
                 }
                 step *= 0.5;

@@ -13,6 +13,8 @@ use crate::problem::Channel;
 const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
 /// Exponents of its force.
 const EXPONENTS: [f64; 2] = [1.0, 1.5];
+/// First step by which its normal is turned, rad: half of what the directions are apart.
+const TURN: f64 = 0.4;
 
 /// Tip and Jacobian (3×N row-major) at the grid rows.
 struct Tips {
@@ -27,6 +29,11 @@ impl Tips {
     fn of(self: &Arc<Self>, dictionary: &Dictionary) -> Arc<Self> {
         let same = self.first == std::ptr::from_ref(dictionary.problem.pairs).addr() && self.rows == dictionary.grid;
         if same { self.clone() } else { Arc::new(tips(dictionary)) }
+    }
+
+    /// How far the tip goes along a direction, m.
+    fn range(&self, normal: &Vector3<f64>) -> (f64, f64) {
+        crate::nominal::range(self.positions.iter().map(|tip| tip.dot(normal)))
     }
 }
 
@@ -45,29 +52,44 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         // A force that never lets go is a weight before it is a contact.
         .penalised(10.0),
     );
-    for (k, normal) in normals().into_iter().enumerate() {
-        let along = tips.positions.iter().map(|tip| tip.dot(&normal));
-        let (low, high) = crate::nominal::range(along);
+    all.push(wall(&tips));
+}
+
+/// A wall that the tip is pressed into; its normal is refined from the nearest of [`normals`].
+fn wall(tips: &Arc<Tips>) -> Family {
+    let mut grid = Vec::new();
+    let mut reach: f64 = 0.0;
+    for normal in normals() {
+        let (low, high) = tips.range(&normal);
+        reach = reach.max(high - low);
+        let angles = [normal.y.atan2(normal.x), normal.z.asin()];
         let walls = WALLS.map(|share| low + share * (high - low));
-        let tips = tips.clone();
-        all.push(
-            Family::shaped(
-                "external_contact",
-                &[],
-                "wall",
-                TORQUE,
-                &[Bound::Positive],
-                &[("x_0", true), ("p", false), ("normal", false)],
-                product(&[&walls, &EXPONENTS, &[k as f64]]),
-                move |d, s| {
-                    let tips = tips.of(d);
-                    // The wall pushes back, against its normal.
-                    vec![effort(d, &tips, |row| -normal * (tips.positions[row].dot(&normal) - s[0]).max(0.0).powf(s[1]))]
-                },
-            )
-            .penalised(4.0),
-        );
+        grid.extend(product(&[&walls, &EXPONENTS]).into_iter().map(|start| [start, angles.to_vec()].concat()));
     }
+    let own = tips.clone();
+    let columns = move |d: &Dictionary, s: &[f64]| {
+        let (tips, normal) = (own.of(d), direction(s[2], s[3]));
+        // The wall pushes back, against its normal.
+        vec![effort(d, &tips, |row| -normal * (tips.positions[row].dot(&normal) - s[0]).max(0.0).powf(s[1]))]
+    };
+    let own = tips.clone();
+    let shape = [("x_0", true), ("p", false), ("azimuth", true), ("elevation", true)];
+    let family = Family::shaped("external_contact", &[], "wall", Channel::JointTorque, &[Bound::Positive], &shape, grid, columns);
+    family
+        .stepped(&[Some(0.1 * reach), None, Some(TURN), Some(TURN)])
+        // A wall that turns is still as deep as it was where the tip goes deepest.
+        .carrying(move |before, after| {
+            let deepest = |s: &[f64]| own.range(&direction(s[2], s[3])).1;
+            if before[2..] != after[2..] {
+                after[0] = deepest(after) - (deepest(before) - before[0]);
+            }
+        })
+        .penalised(4.0)
+}
+
+/// Unit vector with an azimuth and an elevation, rad.
+pub fn direction(azimuth: f64, elevation: f64) -> Vector3<f64> {
+    Vector3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin())
 }
 
 fn tips(dictionary: &Dictionary) -> Tips {
@@ -96,8 +118,8 @@ fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3
     dictionary.effort(&torques, true)
 }
 
-/// Directions of walls: the six axes and the twelve between two of them.
-pub fn normals() -> Vec<Vector3<f64>> {
+/// Directions in which walls are looked for: the six axes and the twelve between two of them.
+fn normals() -> Vec<Vector3<f64>> {
     let mut all = Vec::new();
     for x in -1..=1 {
         for y in -1..=1 {

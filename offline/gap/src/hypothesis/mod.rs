@@ -15,7 +15,7 @@ pub use unknown::UNMODELLED;
 use std::sync::Arc;
 
 pub use dictionary::{Column, Dictionary, Window};
-pub use environment::normals;
+pub use environment::direction;
 
 use crate::problem::Channel;
 
@@ -32,6 +32,9 @@ pub enum Bound {
 
 /// Columns for a shape.
 type Columns = dyn Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync;
+
+/// Numbers that follow another: the shape before, and the one to be tried.
+pub type Carry = dyn Fn(&[f64], &mut [f64]) + Send + Sync;
 
 /// One form of a physics at its place: linear in its coefficients, for shapes that are searched.
 pub struct Family {
@@ -56,6 +59,8 @@ pub struct Family {
     pub bounds: Vec<Bound>,
     /// Rank among equals: smaller is simpler or likelier before any data.
     pub penalty_nats: f64,
+    /// What the other numbers of its shape follow when one is refined.
+    pub carry: Option<Arc<Carry>>,
     columns: Arc<Columns>,
 }
 
@@ -86,6 +91,7 @@ impl Family {
             secant: false,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
+            carry: None,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
         }
     }
@@ -113,6 +119,7 @@ impl Family {
             grid,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
+            carry: None,
             columns: Arc::new(columns),
         }
     }
@@ -136,6 +143,13 @@ impl Family {
     #[must_use]
     pub fn stepped(mut self, steps: &[Option<f64>]) -> Self {
         self.steps = steps.to_vec();
+        self
+    }
+
+    /// With what its other numbers follow when one is refined: the shape before, and the one to be tried.
+    #[must_use]
+    pub fn carrying(mut self, carry: impl Fn(&[f64], &mut [f64]) + Send + Sync + 'static) -> Self {
+        self.carry = Some(Arc::new(carry));
         self
     }
 
