@@ -83,6 +83,20 @@ fn the_service_loads_what_was_trained_and_infer_gives_the_golden_outputs() {
 }
 
 #[test]
+fn runs_after_one_homing_have_its_offset_and_different_motions() {
+    let folder = Folder::new("homing");
+    let _ = folder.runs();
+    let summary = std::fs::read_to_string(folder.file("runs").join("simulation.txt")).expect("summary");
+    let mut offsets: Vec<&str> =
+        summary.lines().filter_map(|line| line.split_once("homing offset")).map(|(_, rest)| rest).collect();
+    assert_eq!(offsets.len(), 4, "{summary}");
+    offsets.dedup();
+    assert_eq!(offsets.len(), 1, "{summary}");
+    let length = |run: usize| std::fs::metadata(folder.file("runs").join(format!("run_{run:04}.mcap"))).expect("run").len();
+    assert_ne!(length(1), length(2));
+}
+
+#[test]
 fn the_shipped_model_is_trained_and_the_service_takes_it() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/raven2-worn.onnx");
     let (_, card) = model::load(&source(&path)).expect("the service's own checks");
