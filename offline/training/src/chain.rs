@@ -160,7 +160,9 @@ mod tests {
             for activation in [Activation::Sigmoid, Activation::Elu] {
                 let mut network = Network::new(&[4, 9, 8, 2], activation, place, &mut random);
                 for numbers in network.all_numbers() {
-                    numbers.iter_mut().for_each(|number| *number += 0.1 + 0.02 * random.normal() as f32);
+                    for number in numbers {
+                        *number += 0.1 + 0.02 * random.normal() as f32;
+                    }
                 }
                 let trained = Trained {
                     network,

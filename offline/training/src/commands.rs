@@ -3,7 +3,7 @@
 use crate::card::{self, Facts};
 use crate::chain::Chain;
 use crate::data::{self, DataSet, Reading, Trajectory, memory};
-use crate::error::{TrainingError, shown};
+use crate::error::{TrainingError, hex, shown};
 use crate::preset::Recipe;
 use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
@@ -167,7 +167,7 @@ fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
 
 fn write_model(out: &Path, chain: &Chain, card: &BTreeMap<String, String>) -> Result<(), TrainingError> {
     let bytes = onnx::write(chain, card);
-    let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+    let digest = hex(&Sha256::digest(&bytes));
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
     write_whole(out, &bytes)?;
     write_whole(&beside(out, "sha256"), format!("{digest}  {name}\n").as_bytes())

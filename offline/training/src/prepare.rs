@@ -76,7 +76,9 @@ impl Prepared {
         let raw: Vec<Vec<(usize, f64)>> = (0..inputs).map(|input| vec![(input, 1.0)]).collect();
         let (mut mean, mut sd) = statistics(trajectories, inputs, &raw);
         // The exported normalisation works in float32; the folded bias has to make up for just that.
-        mean.iter_mut().for_each(|mean| *mean = f64::from(*mean as f32));
+        for mean in &mut mean {
+            *mean = f64::from(*mean as f32);
+        }
         // Both sides of a difference are normalised alike, so that it cancels before anything is rounded.
         for terms in sums.iter().filter(|terms| terms.len() == 2) {
             let (a, b) = (terms[0].0, terms[1].0);

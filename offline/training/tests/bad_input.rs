@@ -21,9 +21,9 @@ fn line(folder: &Folder, files: &[PathBuf], columns: Option<Columns>) -> String 
     line
 }
 
-fn columns(inputs: &[&str], truth: &[&str]) -> Option<Columns> {
+fn columns(inputs: &[&str], truth: &[&str]) -> Columns {
     let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    Some(Columns { inputs: owned(inputs), truth: owned(truth), ..Columns::default() })
+    Columns { inputs: owned(inputs), truth: owned(truth), ..Columns::default() }
 }
 
 fn table(header: &str, row: impl Fn(usize) -> String) -> String {
@@ -41,7 +41,7 @@ fn a_recording_without_truth_is_named() {
     let found = line(&folder, &files, None);
     assert!(found.contains("run_0.txt") && found.contains("has no truth"), "{found}");
     let csv = folder.text("a.csv", &table("t_s,jpos_1_rad", |k| format!("{k}")));
-    let found = line(&folder, &[csv], columns(&["jpos_1_rad"], &["truth_jpos_1_rad"]));
+    let found = line(&folder, &[csv], Some(columns(&["jpos_1_rad"], &["truth_jpos_1_rad"])));
     assert!(found.contains("no column truth_jpos_1_rad"), "{found}");
 }
 
@@ -58,7 +58,7 @@ fn inputs_that_never_change_are_refused() {
     let files: Vec<PathBuf> = (0..3)
         .map(|n| folder.text(&format!("{n}.csv"), &table("t_s,jpos_1_rad,truth_jpos_1_rad", |k| format!("0.5,{}", k + n))))
         .collect();
-    let found = line(&folder, &files, columns(&["jpos_1_rad"], &["truth_jpos_1_rad"]));
+    let found = line(&folder, &files, Some(columns(&["jpos_1_rad"], &["truth_jpos_1_rad"])));
     assert!(found.contains("all 1 inputs are constant"), "{found}");
 }
 
@@ -67,7 +67,7 @@ fn a_cell_that_is_no_number_is_named_with_its_row() {
     let folder = Folder::new("nan");
     let header = "t_s,jpos_1_rad,truth_jpos_1_rad";
     let csv = folder.text("nan.csv", &table(header, |k| if k == 7 { ",0.1".to_owned() } else { format!("{k},0.1") }));
-    let found = line(&folder, &[csv], columns(&["jpos_1_rad"], &["truth_jpos_1_rad"]));
+    let found = line(&folder, &[csv], Some(columns(&["jpos_1_rad"], &["truth_jpos_1_rad"])));
     assert!(found.contains("nan.csv") && found.contains("row 8"), "{found}");
 }
 
@@ -75,6 +75,6 @@ fn a_cell_that_is_no_number_is_named_with_its_row() {
 fn units_that_contradict_the_header_are_refused() {
     let folder = Folder::new("units");
     let csv = folder.text("kg.csv", &table("t_s,jpos_1_kg,truth_jpos_1_rad", |k| format!("{k},0.1")));
-    let found = line(&folder, &[csv], columns(&["jpos_1_kg"], &["truth_jpos_1_rad"]));
+    let found = line(&folder, &[csv], Some(columns(&["jpos_1_kg"], &["truth_jpos_1_rad"])));
     assert!(found.contains("kg.csv") && found.contains("kg"), "{found}");
 }

@@ -94,7 +94,7 @@ fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) 
 fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, String> {
     let runs = commands::all(wish.commands, model, wish.arm)?;
     let (files, summary) = files(wish, runs.len(), format)?;
-    let seed = wish.seed.unwrap_or_default();
+    let seed = wish.homing_seed.or(wish.seed).unwrap_or_default();
     let total = runs.iter().map(|run| run.len() as u64).sum();
     workers::all(&files, total, wish.threads, |index, watch| follow(model, &runs[index], &files[index], seed, watch))?;
     let mut text = format!("robot = {}\nruns = {}\n", model.name(), runs.len());

@@ -5,7 +5,7 @@ mod noise;
 mod raven;
 mod table;
 
-use crate::error::TrainingError;
+use crate::error::{TrainingError, hex};
 use crate::random::Random;
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
@@ -30,15 +30,19 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// What this run is, whatever its name and rate: a hash of its first row without memory and noise.
+    /// What this run is, whatever its rate: a hash of its first row without memory and noise. A RAVEN-II's state is like no other;
+    /// the few columns of a table may begin alike, so there the file's name counts too.
     pub fn id(&self) -> String {
         let width = self.inputs.len() / self.rows().max(1);
         let outputs = self.exact.len() / self.rows().max(1);
         let mut hash = Sha256::new();
+        if width < FEATURES {
+            hash.update(&self.name);
+        }
         for number in self.inputs.iter().take(width.min(FEATURES)).chain(self.exact.iter().take(outputs)) {
             hash.update(number.to_le_bytes());
         }
-        hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+        hex(&hash.finalize()[..8])
     }
 
     /// Number of rows.

@@ -159,7 +159,7 @@ impl<'a> Pairing<'a> {
             let looked_for = format!("no true tip and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
             return Err(TrainingError::NoTruth { file: shown(self.file), looked_for });
         }
-        self.found.exact = self.found.labels.clone();
+        self.found.exact.clone_from(&self.found.labels);
         Ok(self.found)
     }
 }

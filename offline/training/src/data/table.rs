@@ -90,7 +90,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
             remedy: "fill or remove the row",
         });
     }
-    found.exact = found.labels.clone();
+    found.exact.clone_from(&found.labels);
     Ok(found)
 }
 

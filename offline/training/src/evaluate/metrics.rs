@@ -93,22 +93,23 @@ pub(crate) fn centred(rests: &[Rest], outputs: usize) -> Vec<Rest> {
 struct Sums {
     rows: f64,
     squares: f64,
-    sums: Vec<f64>,
+    means_times_rows: Vec<f64>,
 }
 
 fn sums(rest: &Rest, outputs: usize) -> Sums {
     Sums {
         rows: (rest.len() / outputs.max(1)) as f64,
         squares: rest.iter().map(|x| f64::from(*x).powi(2)).sum(),
-        sums: (0..outputs).map(|axis| rest.iter().skip(axis).step_by(outputs).map(|x| f64::from(*x)).sum()).collect(),
+        means_times_rows: (0..outputs).map(|axis| rest.iter().skip(axis).step_by(outputs).map(|x| f64::from(*x)).sum()).collect(),
     }
 }
 
 fn rms_and_sd(all: &[Sums], chosen: &[usize]) -> (f64, f64) {
     let rows: f64 = chosen.iter().map(|i| all[*i].rows).sum::<f64>().max(1.0);
     let mean_square = chosen.iter().map(|i| all[*i].squares).sum::<f64>() / rows;
-    let outputs = all.first().map_or(0, |one| one.sums.len());
-    let means: f64 = (0..outputs).map(|axis| (chosen.iter().map(|i| all[*i].sums[axis]).sum::<f64>() / rows).powi(2)).sum();
+    let outputs = all.first().map_or(0, |one| one.means_times_rows.len());
+    let means: f64 =
+        (0..outputs).map(|axis| (chosen.iter().map(|i| all[*i].means_times_rows[axis]).sum::<f64>() / rows).powi(2)).sum();
     (mean_square.sqrt(), (mean_square - means).max(0.0).sqrt())
 }
 

@@ -82,7 +82,7 @@ impl Network {
     }
 
     /// Outputs with the running statistics of batch normalisation.
-    pub fn forward(&self, input: ArrayView2<f32>) -> Array2<f32> {
+    pub fn forward(&self, input: &ArrayView2<f32>) -> Array2<f32> {
         let mut x = input.to_owned();
         for layer in &self.layers {
             let mut y = layer.sum(&x);

@@ -4,7 +4,7 @@
 
 use super::{Course, Point};
 use crate::data::Trajectory;
-use crate::error::TrainingError;
+use crate::error::{TrainingError, hex};
 use crate::preset::Recipe;
 use crate::random::Random;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ pub(super) fn identity(recipe: &Recipe, train: &[Trajectory], validation: &[Traj
             hash.update(number.to_le_bytes());
         }
     }
-    hash.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    hex(&hash.finalize()[..16])
 }
 
 /// Writes a checkpoint.

@@ -67,7 +67,7 @@ impl Trained {
         let raw = self.prepared.mean.len().max(1);
         let mut out = Vec::new();
         for rows in inputs.chunks(raw * CHUNK_ROWS) {
-            let y = self.network.forward(self.prepared.apply(rows).view());
+            let y = self.network.forward(&self.prepared.apply(rows).view());
             for row in y.rows() {
                 out.extend(row.iter().zip(&self.label_mean).map(|(y, mean)| (f64::from(*y) * self.label_scale + mean) as f32));
             }
@@ -256,7 +256,7 @@ fn rms(network: &Network, rows: &Rows) -> f64 {
     for start in (0..rows.x.nrows()).step_by(CHUNK_ROWS) {
         let end = (start + CHUNK_ROWS).min(rows.x.nrows());
         let slice = ndarray::s![start..end, ..];
-        let rest = network.forward(rows.x.slice(slice)) - rows.y.slice(slice);
+        let rest = network.forward(&rows.x.slice(slice)) - rows.y.slice(slice);
         squares += rest.iter().map(|rest| f64::from(*rest).powi(2)).sum::<f64>();
     }
     (squares / rows.x.nrows().max(1) as f64).sqrt()
