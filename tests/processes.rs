@@ -1,14 +1,20 @@
 //! Real processes, real shared memory, real signals: killed and restarted in any order, stopped at any phase, started twice.
 //!
 //! `RAVENPOSE_KILLS` sets the number of kills of each kind of process (50; `make faults` does 10,000).
+//!
+//! Shared machines stop for a good part of a second now and then. Such stops are measured beside the test (`Stalls`) and added to its
+//! limits; a service that its own watchdog ended because of one is started anew, as systemd does, and counted.
 
 mod common;
 #[path = "common/service.rs"]
 mod service;
+#[path = "common/stalls.rs"]
+mod stalls;
 
 use ravenpose_transport::{Reader, Settings, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, flag};
 use service::{Process, World, publish_forever, role, whole};
+use stalls::Stalls;
 use std::io::{BufRead, BufReader};
 use std::time::{Duration, Instant};
 
@@ -27,7 +33,7 @@ fn kills() -> u64 {
     std::env::var("RAVENPOSE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(50)
 }
 
-/// A client that says `fresh` at its first fresh pose and `WRONG ...` at any fault.
+/// A client that says `fresh` and the time at its first fresh pose, and `WRONG ...` at any fault.
 fn client() -> ! {
     let reader: Reader<CorrectedPose> = Reader::open(&Settings::from_env(), 64).expect("reader");
     let mut said = false;
@@ -43,7 +49,7 @@ fn client() -> ! {
             }
             if age < POSE_AGE_MAX_NS && !said {
                 said = true;
-                println!("fresh");
+                println!("fresh {}", now_ns());
             }
             if pose.sequence == last {
                 println!("WRONG: sequence {last} twice");
@@ -55,17 +61,20 @@ fn client() -> ! {
     }
 }
 
-/// Reads a client's words until it says `fresh`; anything wrong ends the test.
-fn hears_fresh(client: &mut Process) -> BufReader<std::process::ChildStdout> {
-    let mut output = BufReader::new(client.0.stdout.take().expect("piped"));
+fn words_of(client: &mut Process) -> BufReader<std::process::ChildStdout> {
+    BufReader::new(client.0.stdout.take().expect("piped"))
+}
+
+/// Reads a client's words until it says `fresh`, and returns when that was; anything wrong ends the test.
+fn hears_fresh(output: &mut BufReader<std::process::ChildStdout>) -> i64 {
     let mut line = String::new();
     loop {
         line.clear();
         assert!(output.read_line(&mut line).expect("client's words") > 0, "the client ended");
         assert!(!line.contains("WRONG"), "{line}");
         // The harness prints the test's name in front of the first line.
-        if line.trim_end().ends_with("fresh") {
-            return output;
+        if let Some((_, time)) = line.trim_end().rsplit_once("fresh ") {
+            return time.parse().expect("a time");
         }
     }
 }
@@ -127,7 +136,9 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
     let mut service = world.start(&config, &[]);
     let mut publisher = world.role(test, "publisher");
     let mut client = world.role(test, "client");
-    let mut client_output = hears_fresh(&mut client);
+    let mut client_output = words_of(&mut client);
+    hears_fresh(&mut client_output);
+    let stalls = Stalls::measure();
     let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
     monitor.watch_ms(300);
     let baseline = common::shared_files(&world.settings.prefix).len();
@@ -136,6 +147,7 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
     let mut rng = common::Rng(seed);
     let (mut slowest_fresh, mut slowest_valid, mut most_files) = (0, 0, baseline);
     let mut left = [kills(); 3];
+    let mut ended_itself = 0;
     for kill in 0..3 * kills() {
         // Any order, the same number of each.
         let mut victim = rng.below(3) as usize;
@@ -145,6 +157,7 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
         left[victim] -= 1;
         let pause = Duration::from_millis(rng.below(50));
         monitor.look();
+        let lost = stalls.lost_ns();
         match victim {
             0 => {
                 publisher.kill();
@@ -162,31 +175,44 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
                 client.kill();
                 nothing_wrong(&mut client_output);
                 std::thread::sleep(pause);
-                let begun = Instant::now();
-                client = world.role(test, "client");
-                client_output = hears_fresh(&mut client);
-                assert!(begun.elapsed() < Duration::from_secs(1), "kill {kill}: the client took {:?}", begun.elapsed());
                 monitor.restart();
+                client = world.role(test, "client");
+                client_output = words_of(&mut client);
             }
         }
-        let begun = monitor.since;
+        let mut begun = monitor.since;
         while monitor.valid.is_none() {
             monitor.watch_ms(1);
-            assert!(now_ns() - begun < 3_000_000_000, "kill {kill} of {victim}: never valid again\n{}", world.log());
+            if service.0.try_wait().expect("status").is_some() {
+                assert!(world.log().contains("the loop is stuck"), "kill {kill} of {victim}: the service ended\n{}", world.log());
+                ended_itself += 1;
+                monitor.restart();
+                begun = monitor.since;
+                service = world.start(&config, &[]);
+            }
+            let limit = 3_000_000_000 + stalls.lost_ns() - lost;
+            assert!(now_ns() - begun < limit, "kill {kill} of {victim}: never valid again\n{}", world.log());
+        }
+        let limit = 1_000_000_000 + stalls.lost_ns() - lost;
+        if victim == 2 {
+            let took = hears_fresh(&mut client_output) - begun;
+            assert!(took < limit, "kill {kill}: the client took {} ms", took / 1_000_000);
         }
         let fresh = monitor.fresh.expect("fresh before valid") - begun;
-        assert!(fresh < 1_000_000_000, "kill {kill} of {victim}: reconnected only after {} ms", fresh / 1_000_000);
+        assert!(fresh < limit, "kill {kill} of {victim}: reconnected only after {} ms", fresh / 1_000_000);
         slowest_fresh = slowest_fresh.max(fresh);
         slowest_valid = slowest_valid.max(monitor.valid.expect("valid") - begun);
         most_files = most_files.max(common::shared_files(&world.settings.prefix).len());
         monitor.watch_ms(5 + rng.below(40) as i64);
     }
     println!(
-        "{} kills of each process: slowest reconnect {} ms, slowest return to valid {} ms (with the start of the process), shared files {baseline} at first, {most_files} at most",
+        "{} kills of each process: slowest reconnect {} ms, slowest return to valid {} ms (with the start of the process), shared files {baseline} at first, {most_files} at most; the machine stopped for {} ms in all, {ended_itself} times so long that the service ended itself",
         kills(),
         slowest_fresh / 1_000_000,
-        slowest_valid / 1_000_000
+        slowest_valid / 1_000_000,
+        stalls.lost_ns() / 1_000_000
     );
+    assert!(ended_itself <= 1 + kills() / 100, "the service ended itself {ended_itself} times");
     // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
     assert!(most_files <= 2 * baseline + 4, "leftovers grow: {most_files} from {baseline}");
     client.kill();
