@@ -1,6 +1,7 @@
 //! `ravenposed.toml`: strict, every complaint with file, line, column, key and remedy.
 
 use crate::cycle::Limits;
+use crate::network::Format;
 use ravenpose_transport::Settings;
 use std::io::Read;
 use std::ops::RangeInclusive;
@@ -84,13 +85,27 @@ pub struct Config {
     pub interval_s: u64,
 }
 
-/// A model file and, optionally, the hash that it must have.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Largest deviation of smaller weights that is allowed unless the configuration says otherwise, µm.
+pub const WEIGHTS_DEVIATION_UM: f64 = 10.0;
+
+/// A model file, the hash that it must have, and how its weights are to be stored.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ModelSource {
     /// The ONNX file.
     pub path: PathBuf,
     /// SHA-256 in hexadecimal; without it `FILE.sha256` is read.
     pub sha256: Option<String>,
+    /// The format of the weights; the smallest that is exact enough if none is stated.
+    pub weights: Option<Format>,
+    /// Largest deviation from float64 that smaller weights may bring, µm.
+    pub weights_deviation_um: f64,
+}
+
+impl ModelSource {
+    /// A file with its hash beside it and everything else as by default.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, sha256: None, weights: None, weights_deviation_um: WEIGHTS_DEVIATION_UM }
+    }
 }
 
 impl Config {
@@ -198,10 +213,15 @@ fn model(table: Option<Table>, base: &Path) -> Result<Option<ModelSource>, Confi
     let path = table.path("model")?;
     let hash = |text: &str| text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit());
     let sha256 = table.text("sha256", "64 hexadecimal digits, as `sha256sum MODEL.onnx` prints", hash)?;
+    let weights = table.weights("weights")?;
+    let weights_deviation_um = table.number("weights_deviation_um", 0.001..=1000.0)?.unwrap_or(WEIGHTS_DEVIATION_UM);
     let (source, name, start) = (table.source, table.name, table.start);
     table.finish()?;
     match path {
-        Some(path) => Ok(Some(ModelSource { path: base.join(path), sha256: sha256.map(|hash| hash.to_ascii_lowercase()) })),
+        Some(path) => {
+            let sha256 = sha256.map(|hash| hash.to_ascii_lowercase());
+            Ok(Some(ModelSource { path: base.join(path), sha256, weights, weights_deviation_um }))
+        }
         None => Err(source.error(start, format!("{name}.model is missing; add model = \"FILE.onnx\" to [{name}]"))),
     }
 }
@@ -316,6 +336,13 @@ impl<'a> Table<'a> {
     fn path(&mut self, key: &'static str) -> Result<Option<PathBuf>, ConfigError> {
         let good = |text: &str| !text.is_empty() && !text.contains(char::is_control);
         Ok(self.text(key, "a path without control characters", good)?.map(PathBuf::from))
+    }
+
+    /// `None` is the free choice, stated or not.
+    fn weights(&mut self, key: &'static str) -> Result<Option<Format>, ConfigError> {
+        let format = |text: &str| if text == "auto" { Some(None) } else { text.parse().ok().map(Some) };
+        let wanted = "\"auto\", \"f32\", \"f16\", \"bf16\", \"i16\" or \"i8\"";
+        Ok(self.take(key, wanted, |value| value.as_str().and_then(format))?.flatten())
     }
 
     fn wait(&mut self, key: &'static str) -> Result<Option<Wait>, ConfigError> {

@@ -4,7 +4,7 @@ use crate::card::{Card, CardError};
 use crate::config::{self, ModelSource, shown_path};
 use crate::cycle::{Estimator, Model};
 use crate::guard::Guard;
-use crate::network::Plan;
+use crate::network::{self, Deviation, NotExactEnough, Plan};
 use ravenpose_importer::{Expected, ImportError, Network};
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
@@ -71,6 +71,14 @@ pub enum ModelError {
         /// The reason.
         cause: CardError,
     },
+    /// Weights of the format asked for are too far off.
+    #[error("{path}: {cause} mm; choose another format, weights = \"auto\", or raise weights_deviation_um")]
+    Weights {
+        /// The file.
+        path: String,
+        /// How far.
+        cause: NotExactEnough,
+    },
     /// The network does not give what it gave when it was exported.
     #[error(
         "{path}: golden pair {index}: output {axis} is {found} mm, the card says {expected} mm; card and network do not belong together, export the model again"
@@ -87,6 +95,24 @@ pub enum ModelError {
         /// As stated.
         expected: f64,
     },
+}
+
+/// A model that the loop may run.
+pub struct Loaded {
+    /// The plan, and what guards it.
+    pub model: Model<Plan>,
+    /// What the file's metadata says.
+    pub card: Card,
+    /// How far the plan's weights are off, mm.
+    pub deviation: Deviation,
+}
+
+impl Loaded {
+    /// `weights i16, at most 0.6 um from float64 over 264 inputs`.
+    pub fn weights(&self) -> String {
+        let Deviation { worst, inputs, .. } = self.deviation;
+        format!("weights {}, at most {:.2} um from float64 over {inputs} inputs", self.model.estimator.format(), worst * 1000.0)
+    }
 }
 
 impl Estimator for Plan {
@@ -119,7 +145,7 @@ fn import(path: &Path, bytes: &[u8]) -> Result<Network, ModelError> {
 ///
 /// # Errors
 /// Any [`ModelError`].
-pub fn load(source: &ModelSource) -> Result<(Model<Plan>, Card), ModelError> {
+pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let path = shown_path(&source.path);
     let bytes = read(&source.path)?;
     let digest: [u8; 32] = Sha256::digest(&bytes).into();
@@ -128,18 +154,20 @@ pub fn load(source: &ModelSource) -> Result<(Model<Plan>, Card), ModelError> {
     drop(bytes);
     let unusable = |cause| ModelError::Card { path: path.clone(), cause };
     let card = Card::read(&network.metadata).map_err(unusable)?;
-    let mut plan = Plan::new(&network);
-    check_golden(&path, &mut plan, &card)?;
+    check_golden(&path, &mut Plan::new(&network), &card)?;
     card.check_range().map_err(unusable)?;
+    let golden: Vec<&[f32]> = card.golden.iter().map(|golden| &*golden.input).collect();
+    let choice = network::choose(&network, &golden, source.weights_deviation_um / 1000.0, source.weights)
+        .map_err(|cause| ModelError::Weights { path: path.clone(), cause })?;
     let model = Model {
-        estimator: plan,
+        estimator: choice.plan,
         guard: Guard::new(card.domain.clone()),
         id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
         bound_um: card.bound_mm * 1000.0,
         bound95_um: card.bound95_mm.map(|mm| mm * 1000.0),
         untrained: card.untrained,
     };
-    Ok((model, card))
+    Ok(Loaded { model, card, deviation: choice.deviation })
 }
 
 fn hex(digest: &[u8]) -> String {

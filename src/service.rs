@@ -160,8 +160,11 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
     for arm in 0..ARMS {
         let Some(source) = &config.models[arm] else { continue };
         match model::load(source) {
-            Ok((loaded, card)) => {
-                names[arm] = format!("{:016x} {}", loaded.id, source.path.display());
+            Ok(loaded) => {
+                let weights = loaded.weights();
+                names[arm] = format!("{:016x} {}, {weights}", loaded.model.id, source.path.display());
+                say(&format!("{} arm: {weights}", NAMES[arm]));
+                let card = &loaded.card;
                 if card.untrained && config.allow_untrained {
                     say(&format!(
                         "{} arm: the model is UNTRAINED; allow_untrained = true publishes its numbers all the same",
@@ -170,7 +173,7 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
                 } else if card.untrained {
                     say(&format!("{} arm: the model is untrained; every pose will be fallback(untrained)", NAMES[arm]));
                 }
-                models[arm] = ArmModel::Loaded(Box::new(loaded));
+                models[arm] = ArmModel::Loaded(Box::new(loaded.model));
             }
             Err(error) if config.allow_degraded => {
                 say(&format!("{} arm: {error}; going on without it, as allow_degraded says", NAMES[arm]));

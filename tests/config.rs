@@ -4,6 +4,7 @@ mod common;
 
 use common::TempDir;
 use ravenpose::config::{Config, ModelSource, Wait};
+use ravenpose::network::Format;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -35,10 +36,13 @@ const UNKNOWN: [(&str, &str); 14] = [
         "limits.envelope_um = 9000",
         ":1:8: unknown key `envelope_um` in [limits] (did you mean `envelope_mm`?); allowed here: {LIMITS}",
     ),
-    ("[gold]\nmodell = \"a.onnx\"", ":2:1: unknown key `modell` in [gold] (did you mean `model`?); allowed here: model, sha256"),
+    (
+        "[gold]\nmodell = \"a.onnx\"",
+        ":2:1: unknown key `modell` in [gold] (did you mean `model`?); allowed here: model, sha256, weights, weights_deviation_um",
+    ),
     (
         "[green]\nmodel = \"a.onnx\"\nsha265 = \"\"",
-        ":3:1: unknown key `sha265` in [green] (did you mean `sha256`?); allowed here: model, sha256",
+        ":3:1: unknown key `sha265` in [green] (did you mean `sha256`?); allowed here: model, sha256, weights, weights_deviation_um",
     ),
     (
         "[report]\ninterval = 60",
@@ -78,7 +82,7 @@ const WRONG_TYPE: [(&str, &str); 21] = [
     ("[report]\ninterval_s = 1e3", ":2:14: report.interval_s = 1e3 must be a whole number from 1 to 86400"),
 ];
 
-const WRONG_VALUE: [(&str, &str); 20] = [
+const WRONG_VALUE: [(&str, &str); 22] = [
     ("[limits]\nstale_us = 1000", ":2:12: limits.stale_us = 1000 must be longer than limits.period_us = 1000"),
     ("[limits]\nperiod_us = 800\nstale_us = 500", ":3:12: limits.stale_us = 500 must be longer than limits.period_us = 800"),
     ("[limits]\nperiod_us = 8_000", ":2:13: limits.stale_us = 5000 (the default) must be longer than limits.period_us = 8000"),
@@ -110,6 +114,14 @@ const WRONG_VALUE: [(&str, &str); 20] = [
         ":2:8: transport.root = \"/a\\u0000\" must be an absolute path of at most 100 bytes, in quotes",
     ),
     ("[gold]", ":1:1: gold.model is missing; add model = \"FILE.onnx\" to [gold]"),
+    (
+        "[gold]\nmodel = \"a.onnx\"\nweights = \"int8\"",
+        ":3:11: gold.weights = \"int8\" must be \"auto\", \"f32\", \"f16\", \"bf16\", \"i16\" or \"i8\"",
+    ),
+    (
+        "[gold]\nmodel = \"a.onnx\"\nweights_deviation_um = 0",
+        ":3:24: gold.weights_deviation_um = 0 must be a number from 0.001 to 1000",
+    ),
     ("[gold]\nmodel = \"\"", ":2:9: gold.model = \"\" must be a path without control characters, in quotes"),
     ("[gold]\nmodel = \"a\\u0007\"", ":2:9: gold.model = \"a\\u0007\" must be a path without control characters, in quotes"),
     (
@@ -194,8 +206,11 @@ late_fallback = 7
 [gold]
 model = "gold.onnx"
 sha256 = "ABCDEF0123456789abcdef0123456789abcdef0123456789abcdef0123456789"
+weights = "f16"
+weights_deviation_um = 2.5
 [green]
 model = "/srv/green.onnx"
+weights = "auto"
 [report]
 runtime_dir = "run"
 histogram_dir = "../histograms"
@@ -369,8 +384,9 @@ fn every_key_is_read() {
     assert_eq!((limits.good_cycles, limits.late_degraded, limits.late_fallback), (50, 2, 7));
     assert_eq!((limits.recover_um, limits.rate_um, limits.envelope_um), (5.0, 80.5, 12_500.0));
     let sha256 = Some("abcdef0123456789abcdef0123456789abcdef0123456789abcdef0123456789".to_owned());
-    assert_eq!(config.models[0], Some(ModelSource { path: directory.0.join("gold.onnx"), sha256 }));
-    assert_eq!(config.models[1], Some(ModelSource { path: PathBuf::from("/srv/green.onnx"), sha256: None }));
+    let gold = ModelSource { path: directory.0.join("gold.onnx"), sha256, weights: Some(Format::F16), weights_deviation_um: 2.5 };
+    assert_eq!(config.models[0], Some(gold));
+    assert_eq!(config.models[1], Some(ModelSource::new(PathBuf::from("/srv/green.onnx"))));
     assert_eq!(config.runtime_dir, directory.0.join("run"));
     assert_eq!(config.histogram_dir, Some(directory.0.join("../histograms")));
     assert_eq!(config.interval_s, 10);

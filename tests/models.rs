@@ -7,7 +7,7 @@ use ravenpose::card::{Card, UNITS};
 use ravenpose::config::ModelSource;
 use ravenpose::cycle::Model;
 use ravenpose::model;
-use ravenpose::network::Plan;
+use ravenpose::network::{Format, Plan};
 use ravenpose_wire::{FEATURES, features};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -270,7 +270,8 @@ fn hash(bytes: &[u8]) -> String {
 
 /// Loads a file; a refusal must be one printable line that begins with the file.
 fn load(path: &Path, sha256: Option<String>) -> Result<(Model<Plan>, Card), String> {
-    model::load(&ModelSource { path: path.to_owned(), sha256 }).map_err(|error| {
+    let source = ModelSource { sha256, ..ModelSource::new(path.to_owned()) };
+    model::load(&source).map(|loaded| (loaded.model, loaded.card)).map_err(|error| {
         let line = error.to_string();
         assert!(!line.contains(|c: char| c.is_control() || c == '\u{202e}'), "{line:?}");
         assert!(line.len() < 700, "{} bytes: {line}", line.len());
@@ -836,6 +837,33 @@ fn a_flipped_bit_under_a_right_hash_gives_a_model_or_one_line() {
 }
 
 #[test]
+fn the_smallest_weights_that_are_exact_enough_are_chosen_and_a_format_that_is_not_is_refused() {
+    let with = |weights, weights_deviation_um| {
+        let source = ModelSource { weights, weights_deviation_um, ..ModelSource::new(common::untrained()) };
+        model::load(&source).map(|loaded| (loaded.model.estimator.format(), loaded.deviation.worst * 1000.0, loaded.weights()))
+    };
+    let mut worst = Vec::new();
+    for (limit_um, format) in [(1e-3, Format::F32), (10.0, Format::I16), (1000.0, Format::I8)] {
+        let (chosen, deviation_um, said) = with(None, limit_um).expect("a choice");
+        assert_eq!(chosen, format, "{limit_um}");
+        assert!(deviation_um <= limit_um && said.starts_with(&format!("weights {format}, at most ")), "{said}");
+        worst.push(deviation_um);
+    }
+    assert!(worst[0] < worst[1] && worst[1] < worst[2], "{worst:?}");
+    for format in Format::ALL {
+        assert_eq!(with(Some(format), 1000.0).expect("exact enough").0, format);
+        let narrow = with(Some(format), 1e-3);
+        if format == Format::F32 {
+            assert!(narrow.is_ok(), "float32 is the network as it came");
+        } else {
+            let line = narrow.err().expect("a refusal").to_string();
+            assert!(line.contains(&format!("untrained.onnx: weights of format {format} deviate by up to 0.0")), "{line}");
+            assert!(line.ends_with("choose another format, weights = \"auto\", or raise weights_deviation_um"), "{line}");
+        }
+    }
+}
+
+#[test]
 fn the_service_says_what_it_does_with_each_kind_of_model() {
     let directory = TempDir::new("models-service");
     let model = |name: &str, onnx: &Onnx| {
@@ -866,8 +894,12 @@ fn the_service_says_what_it_does_with_each_kind_of_model() {
         let answer = service(&directory.file("config.toml", &config));
         let stderr = String::from_utf8_lossy(&answer.stderr);
         assert_eq!(answer.status.code(), Some(0), "{config}{stderr}");
-        assert!(stderr.starts_with(&said) && stderr.lines().count() <= 1, "{config}{stderr}");
-        assert_eq!(said.is_empty(), stderr.is_empty(), "{config}{stderr}");
+        let (weights, others): (Vec<&str>, Vec<&str>) = stderr.lines().partition(|line| line.contains(" arm: weights "));
+        assert_eq!(weights.len(), usize::from(!config.contains("wrong")), "{config}{stderr}");
+        assert!(
+            others.len() <= 1 && others.first().map_or(said.is_empty(), |line| format!("{line}\n").starts_with(&said)),
+            "{config}{stderr}"
+        );
     }
     let line =
         service_refusal(&directory.file("config.toml", format!("{}[green]\nmodel = \"trained.onnx\"\n", gold("wrong.onnx"))));

@@ -30,9 +30,8 @@ const WARM_UP: u64 = 5_000;
 const ATTEMPTS: u32 = 3;
 
 fn untrained() -> ArmModel<Plan> {
-    let source = ModelSource { path: common::untrained(), sha256: None };
-    let (model, _) = model::load(&source).expect("the repository's model");
-    ArmModel::Loaded(Box::new(model))
+    let loaded = model::load(&ModelSource::new(common::untrained())).expect("the repository's model");
+    ArmModel::Loaded(Box::new(loaded.model))
 }
 
 fn runner(settings: &Settings, wait: Wait) -> (Runner<Plan>, histogram::Collector, shared::EventReceiver, Arc<Shared>) {

@@ -1,116 +1,246 @@
-//! The network alone: our plan beside tract's runner and beside the floor, which is reading the weights once.
+//! The network alone: our plan in every format beside ONNX Runtime, tract and the floor of each format, which is reading its weights
+//! once. In a tight loop, once a millisecond between sleeps, and with the weights flushed from the cache.
 //!
-//! This module contains `unsafe`: a call of a function compiled for an instruction set that was found on this machine.
+//! This module contains `unsafe`: calls of functions compiled for an instruction set that was found on this machine, and flushing lines.
 
+use crate::onnxruntime;
 use crate::table::{Table, quantiles};
-use ravenpose::network::{InstructionSet, Plan};
-use ravenpose_importer::{Expected, Oracle};
-use ravenpose_transport::now_ns;
+use ravenpose::network::{Format, InstructionSet, Plan, choose};
+use ravenpose_importer::{Expected, Network, Oracle};
+use ravenpose_transport::{now_ns, sleep_until_ns};
 
 const ROUNDS: usize = 5;
 const WARM_UP: usize = 500;
 const INPUTS: usize = 64;
+/// Runs between sleeps, and with flushed weights, per engine and round.
+const SLOW_ROUNDS: usize = 3;
 
-/// Sums the weights: the least that any evaluation must read. Written like the kernel, with eight accumulators.
+/// Sums the bytes of the weights as words: the least that any evaluation must read. Eight accumulators, like the kernel.
 #[inline(never)]
-fn stream(weights: &[f32]) -> f32 {
+fn stream(weights: &[u8]) -> u64 {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx512f") {
         // SAFETY: the instruction set was found on this machine.
         return unsafe { stream_avx512(weights) };
     }
-    stream_any(weights)
+    let mut sums = [0_u64; 8];
+    for line in weights.as_chunks::<64>().0 {
+        for (sum, word) in sums.iter_mut().zip(line.as_chunks::<8>().0) {
+            *sum = sum.wrapping_add(u64::from_le_bytes(*word));
+        }
+    }
+    sums.iter().fold(0, |total, sum| total.wrapping_add(*sum))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn stream_avx512(weights: &[f32]) -> f32 {
-    stream_any(weights)
-}
-
-#[expect(clippy::inline_always, reason = "compiled for the caller's instruction set")]
-#[inline(always)]
-fn stream_any(weights: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; 128];
-    for chunk in weights.chunks_exact(128) {
-        for (sum, weight) in sums.iter_mut().zip(chunk) {
-            *sum += weight;
+fn stream_avx512(weights: &[u8]) -> u64 {
+    use std::arch::x86_64::{_mm512_add_epi64, _mm512_loadu_si512, _mm512_reduce_add_epi64, _mm512_setzero_si512};
+    let mut sums = [_mm512_setzero_si512(); 8];
+    for lines in weights.as_chunks::<512>().0 {
+        for (sum, line) in sums.iter_mut().zip(lines.as_chunks::<64>().0) {
+            // SAFETY: a line is 64 bytes.
+            *sum = _mm512_add_epi64(*sum, unsafe { _mm512_loadu_si512(line.as_ptr().cast()) });
         }
     }
-    sums.iter().sum()
+    sums.into_iter().fold(0, |total, sum| total.wrapping_add(_mm512_reduce_add_epi64(sum).cast_unsigned()))
 }
 
-/// Times each engine in turn, round by round, so that drift of the machine meets all alike.
-pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Table, String> {
+/// Something that takes time.
+enum Engine {
+    Floor(Box<Plan>),
+    Plan(Box<Plan>),
+    OnnxRuntime(Box<onnxruntime::Session>),
+    Tract(Box<Oracle>),
+}
+
+impl Engine {
+    fn run(&mut self, input: &[f32]) -> f32 {
+        match self {
+            Self::Floor(plan) => plan.memory().map(stream).fold(0, u64::wrapping_add) as f32,
+            Self::Plan(plan) => {
+                let mut output = [0.0_f32; 3];
+                plan.run(input, &mut output);
+                output[0]
+            }
+            Self::OnnxRuntime(session) => session.run(input),
+            Self::Tract(oracle) => oracle.run(input).map_or(f32::NAN, |output| output[0]),
+        }
+    }
+
+    /// Flushes the weights from every cache; false where they cannot be reached.
+    fn flush(&self) -> bool {
+        match self {
+            Self::Floor(plan) | Self::Plan(plan) => plan.memory().for_each(|bytes| flush(bytes.as_ptr(), bytes.len())),
+            Self::OnnxRuntime(_) | Self::Tract(_) => return false,
+        }
+        true
+    }
+}
+
+fn flush(from: *const u8, length: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for offset in (0..length).step_by(64) {
+        // SAFETY: an address inside memory that the caller borrows; flushing changes no value.
+        unsafe { std::arch::x86_64::_mm_clflush(from.add(offset)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (from, length);
+}
+
+/// An engine with its times.
+struct Contender {
+    name: String,
+    engine: Engine,
+    /// The floor that it is held against: its place among the contenders.
+    floor: usize,
+    inputs: Vec<Vec<f32>>,
+    medians: Vec<f64>,
+    times: Vec<i64>,
+}
+
+impl Contender {
+    fn new(name: String, engine: Engine, floor: usize, inputs: &[Vec<f32>]) -> Self {
+        Self { name, engine, floor, inputs: inputs.to_vec(), medians: Vec::new(), times: Vec::new() }
+    }
+
+    /// One round: `warm_up` runs that do not count, then `runs` that do, with `before` in front of each.
+    fn round(&mut self, warm_up: usize, runs: usize, mut before: impl FnMut(&Engine)) -> f32 {
+        let mut sink = 0.0;
+        let mut taken = Vec::with_capacity(runs);
+        for count in 0..warm_up + runs {
+            before(&self.engine);
+            let input = &self.inputs[count % self.inputs.len()];
+            let start = now_ns();
+            sink += self.engine.run(input);
+            if count >= warm_up {
+                taken.push(now_ns() - start);
+            }
+        }
+        self.medians.push(quantiles(&mut taken)[0]);
+        self.times.append(&mut taken);
+        sink
+    }
+
+    fn median(&self) -> f64 {
+        let mut sorted = self.medians.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// Times every engine in turn, round by round, so that drift of the machine meets all alike.
+pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Vec<Table>, String> {
     let expected = Expected { inputs: 118, outputs: 3 };
     let network = ravenpose_importer::import(bytes, &expected).map_err(|error| error.to_string())?;
-    let mut plan = Plan::new(&network);
-    let mut narrow = Plan::with(&network, InstructionSet::Avx2);
-    let mut oracle = Oracle::new(bytes, &expected).map_err(|error| error.to_string())?;
-    let weights = vec![0.5_f32; plan.bytes() / 4];
-    let inputs = inputs(&network);
-    let names = [
-        format!("floor: read {:.2} MB of weights once", plan.bytes() as f64 / 1e6),
-        format!("ravenpose f32, {}", plan.instruction_set().name()),
-        format!("ravenpose f32, {}", narrow.instruction_set().name()),
-        "tract, kept state".to_owned(),
-        "ravenpose f32, denormal inputs".to_owned(),
-        "ravenpose f32, inputs that saturate every sigmoid".to_owned(),
-    ];
-    let denormal = vec![vec![1e-40_f32; 118]];
-    let saturating: Vec<Vec<f32>> =
-        (0..INPUTS).map(|row| (0..118).map(|i| if (row * 7 + i) % 3 == 0 { 1e4 } else { -1e4 }).collect()).collect();
-    let mut medians = vec![Vec::new(); names.len()];
-    let mut times = vec![Vec::new(); names.len()];
+    let mut contenders = contenders(bytes, &network, &expected)?;
     let mut sink = 0.0_f32;
+    let mut tables = vec![deviations(&network)];
+
     for round in 0..ROUNDS {
-        for turn in 0..names.len() {
-            let engine = (turn + round) % names.len();
-            let mut output = [0.0_f32; 3];
-            let mut taken = Vec::with_capacity(runs);
-            for count in 0..WARM_UP + runs {
-                let set = match engine {
-                    4 => &denormal,
-                    5 => &saturating,
-                    _ => &inputs,
-                };
-                let input = &set[count % set.len()];
-                let start = now_ns();
-                match engine {
-                    0 => sink += stream(&weights),
-                    1 | 4 | 5 => plan.run(input, &mut output),
-                    2 => narrow.run(input, &mut output),
-                    _ => sink += oracle.run(input).map_err(|error| error.to_string())?[0],
-                }
-                if count >= WARM_UP {
-                    taken.push(now_ns() - start);
-                }
-                sink += output[0];
-            }
-            medians[engine].push(quantiles(&mut taken.clone())[0]);
-            times[engine].append(&mut taken);
+        for turn in 0..contenders.len() {
+            let at = (turn + round) % contenders.len();
+            sink += contenders[at].round(WARM_UP, runs, |_| ());
         }
     }
-    std::hint::black_box(sink);
-    let median = |values: &[f64]| {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted[sorted.len() / 2]
-    };
-    let (floor, tract) = (median(&medians[0]), median(&medians[3]));
-    let mut table =
-        Table::new("Network 118-600-500-400-3, one thread, tight loop, us", &["p50", "p99", "p99.9", "max", "x floor", "x tract"]);
-    for (index, name) in names.iter().enumerate() {
-        let mut row = quantiles(&mut times[index]).to_vec();
-        row[0] = median(&medians[index]);
-        row.extend([row[0] / floor, row[0] / tract]);
-        table.row(name, &row);
+    tables.push(table("Network 118-600-500-400-3, one thread, tight loop, us", &mut contenders));
+
+    for _ in 0..SLOW_ROUNDS {
+        for contender in &mut contenders {
+            let mut next = now_ns();
+            sink += contender.round(50, runs / 8, |_| {
+                next = (next + 1_000_000).max(now_ns());
+                sleep_until_ns(next);
+            });
+        }
     }
-    Ok(table)
+    tables.push(table("The same once a millisecond, asleep between", &mut contenders));
+
+    contenders.retain(|contender| contender.engine.flush());
+    for _ in 0..SLOW_ROUNDS {
+        for contender in &mut contenders {
+            sink += contender.round(5, runs / 40, |engine| {
+                engine.flush();
+            });
+        }
+    }
+    tables.push(table("The same with the weights flushed from every cache", &mut contenders));
+    std::hint::black_box(sink);
+    Ok(tables)
+}
+
+fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Vec<Contender>, String> {
+    let usual = inputs(network);
+    let mut all = Vec::new();
+    for format in [Format::F32, Format::F16, Format::I16, Format::I8] {
+        let plan = Plan::with(network, InstructionSet::best(), format);
+        let floor = all.len();
+        if format != Format::I16 {
+            let same = Box::new(Plan::with(network, InstructionSet::best(), format));
+            all.push(Contender::new(
+                format!("floor: read {:.2} MB once", plan.bytes() as f64 / 1e6),
+                Engine::Floor(same),
+                floor,
+                &usual,
+            ));
+        }
+        let floor = if format == Format::I16 { floor - 3 } else { floor };
+        let narrow = Plan::with(network, InstructionSet::Avx2, format);
+        let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
+        all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
+        all.push(Contender::new(name(&narrow), Engine::Plan(Box::new(narrow)), floor, &usual));
+    }
+    match onnxruntime::library() {
+        Some(library) => {
+            let session = onnxruntime::Session::open(&library, bytes, "ravenstate", "position_error", [118, 3])?;
+            let name = format!("ONNX Runtime {}, C, bound memory", session.version);
+            all.push(Contender::new(name, Engine::OnnxRuntime(Box::new(session)), 0, &usual));
+        }
+        None => println!("note: no ONNX Runtime to compare with; `make venv` installs it"),
+    }
+    let oracle = Oracle::new(bytes, expected).map_err(|error| error.to_string())?;
+    all.push(Contender::new("tract, kept state".to_owned(), Engine::Tract(Box::new(oracle)), 0, &usual));
+    let plan = || Engine::Plan(Box::new(Plan::with(network, InstructionSet::best(), Format::F32)));
+    all.push(Contender::new("  ravenpose f32, denormal inputs".to_owned(), plan(), 0, &[vec![1e-40_f32; 118]]));
+    let saturating: Vec<Vec<f32>> =
+        (0..INPUTS).map(|row| (0..118).map(|i| if (row * 7 + i) % 3 == 0 { 1e4 } else { -1e4 }).collect()).collect();
+    all.push(Contender::new("  ravenpose f32, saturated sigmoids".to_owned(), plan(), 0, &saturating));
+    Ok(all)
+}
+
+/// Rows of the contenders, whose times are taken away.
+fn table(title: &str, contenders: &mut [Contender]) -> Table {
+    let mut table = Table::new(title, &["p50", "p99", "p99.9", "max", "x floor", "/ ORT", "/ tract"]);
+    let median_of = |word: &str| contenders.iter().find(|c| c.name.starts_with(word)).map_or(f64::NAN, Contender::median);
+    let (runtime, tract) = (median_of("ONNX Runtime"), median_of("tract"));
+    let floors: Vec<f64> =
+        contenders.iter().map(|contender| contenders.get(contender.floor).map_or(f64::NAN, Contender::median)).collect();
+    for (contender, floor) in contenders.iter_mut().zip(floors) {
+        let mut row = quantiles(&mut contender.times).to_vec();
+        row[0] = contender.median();
+        row.extend([row[0] / floor, row[0] / runtime, row[0] / tract]);
+        table.row(&contender.name, &row);
+        contender.times.clear();
+        contender.medians.clear();
+    }
+    table
+}
+
+/// How far each format is off, in µm, as the service measures it at start.
+fn deviations(network: &Network) -> Table {
+    let mut table = Table::new("Deviation from float64 on 256 random inputs, um", &["worst", "rms", "MB"]);
+    for format in Format::ALL {
+        if let Ok(choice) = choose(network, &[], f64::INFINITY, Some(format)) {
+            let um = |mm: f64| mm * 1000.0;
+            let row = [um(choice.deviation.worst), um(choice.deviation.rms), choice.plan.bytes() as f64 / 1e6];
+            table.row(&format!("ravenpose {format}"), &row);
+        }
+    }
+    table
 }
 
 /// Inputs spread over what the network normalises for.
-fn inputs(network: &ravenpose_importer::Network) -> Vec<Vec<f32>> {
+fn inputs(network: &Network) -> Vec<Vec<f32>> {
     (0..INPUTS)
         .map(|row| {
             (0..network.input_width)

@@ -3,6 +3,7 @@
 //! These machines are shared and noisy: compare by ratio, within one run.
 
 mod kernel;
+mod onnxruntime;
 mod path;
 mod table;
 
@@ -44,7 +45,7 @@ fn measure(runs: usize, seconds: u64) -> Result<(), String> {
     println!("{cores} cores; robot on core {ROBOT_CORE}, service on core {service_core}; every figure in us\n");
 
     // Without FIFO here: a thread that computes without a pause would meet real-time throttling.
-    let table = std::thread::scope(|scope| {
+    let tables = std::thread::scope(|scope| {
         scope
             .spawn(|| {
                 let _ = realtime::pin(service_core);
@@ -53,7 +54,12 @@ fn measure(runs: usize, seconds: u64) -> Result<(), String> {
             .join()
             .map_err(|_| "the kernel benchmark failed".to_owned())?
     })?;
-    println!("{table}");
+    for table in tables {
+        println!("{table}");
+    }
+    if std::env::var("RAVENPOSE_BENCH_ONLY").as_deref() == Ok("kernel") {
+        return Ok(());
+    }
 
     for missing in
         [realtime::lock_memory(), realtime::pin(ROBOT_CORE), realtime::set_fifo(ROBOT_PRIORITY)].into_iter().filter_map(Result::err)
@@ -67,7 +73,7 @@ fn measure(runs: usize, seconds: u64) -> Result<(), String> {
     let us = |ns: u64| ns as f64 / 1000.0;
     let baseline = [us(wakeup.p50_ns), us(wakeup.p99_ns), us(wakeup.p999_ns), us(wakeup.max_ns), f64::NAN];
     table.row("this machine: wake-up of a FIFO thread, 10 s", &baseline);
-    // RAVENPOSE_BENCH_ONLY=sleep measures one way of waiting alone.
+    // RAVENPOSE_BENCH_ONLY=sleep measures one way of waiting alone, =kernel the network alone.
     let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
     for wait in ["sleep", "spin", "event"].into_iter().filter(|wait| only.as_deref().is_none_or(|only| only == *wait)) {
         path::run(&mut table, wait, service_core, seconds)?;

@@ -8,7 +8,7 @@
 #![expect(clippy::inline_always, reason = "inlined into functions compiled for an instruction set, or they would not use it")]
 
 use super::InstructionSet;
-use super::kernel::Lane;
+use super::instructions::Lane;
 use ravenpose_importer::Activation;
 
 /// Beyond this a sigmoid is 0 or 1 to 4e-18, and its smallest value stays far from the denormal range.
@@ -18,7 +18,7 @@ pub(super) fn apply(set: InstructionSet, activation: Activation, values: &mut [L
     match set {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `set` was found on this machine.
-        InstructionSet::Avx512 => unsafe { apply_avx512(activation, values) },
+        InstructionSet::Avx512 | InstructionSet::Avx512Vnni => unsafe { apply_avx512(activation, values) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `set` was found on this machine.
         InstructionSet::Avx2 => unsafe { apply_avx2(activation, values) },

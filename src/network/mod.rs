@@ -1,25 +1,48 @@
 //! The network as a fixed plan: every buffer exists, padded and aligned, before the first run.
 //!
-//! A dense layer at batch 1 is a stream of weights: the cost is reading them once. Rows are padded to 64-byte lanes and worked on
-//! four at a time; the widest instruction set of the machine is chosen when the plan is made (`docs/decisions/0004`).
+//! A dense layer at batch 1 is a stream of weights: the cost is reading them once, so that smaller weights are faster weights
+//! (`docs/decisions/0013`). The widest instruction set of the machine is chosen when the plan is made.
 
 mod activation;
-mod kernel;
+mod deviation;
+mod format;
+mod instructions;
+mod rows;
+#[cfg(target_arch = "x86_64")]
+mod tiles;
 
-pub use kernel::InstructionSet;
+pub use deviation::{Choice, Deviation, NotExactEnough, RANDOM_INPUTS, choose};
+pub use format::{Format, UnknownFormat};
+pub use instructions::InstructionSet;
 
-use kernel::{LANE, Lane, ROWS};
-use ravenpose_importer::{Activation, Network};
+use instructions::{LANE, Lane, Line, bytes_of};
+use ravenpose_importer::{Activation, Dense, Network};
+use rows::Rows;
+#[cfg(target_arch = "x86_64")]
+use tiles::{Digits, Tiles};
 
 /// Weights below this are zero: they change no output of any use, and keep products out of the denormal range, where some
 /// processors are a hundred times slower.
 const SMALLEST_WEIGHT: f32 = 1e-30;
 
+/// Most inputs of a layer whose sums of products of bytes fit in 32 bits.
+#[cfg(target_arch = "x86_64")]
+const TILES_INPUTS_MAX: usize = 65_000;
+
+/// Random inputs over which the mean of each layer's inputs is taken.
+const MEAN_INPUTS: usize = 64;
+
+enum Weights {
+    Rows(Rows),
+    #[cfg(target_arch = "x86_64")]
+    Tiles(Tiles),
+}
+
 struct Layer {
-    weights: Box<[Lane]>,
+    weights: Weights,
     bias: Box<[Lane]>,
-    /// Lanes of one row.
-    row_lanes: usize,
+    /// Lanes of outputs.
+    lanes: usize,
     activation: Activation,
 }
 
@@ -33,7 +56,10 @@ pub struct Plan {
     /// Activations; each layer reads one and writes the other.
     front: Box<[Lane]>,
     back: Box<[Lane]>,
+    #[cfg(target_arch = "x86_64")]
+    digits: Digits,
     instruction_set: InstructionSet,
+    format: Format,
 }
 
 fn lanes(width: usize) -> usize {
@@ -53,16 +79,29 @@ fn padded(values: &[f32], count: usize) -> Box<[Lane]> {
 }
 
 impl Plan {
-    /// Compiles a network for the widest instruction set of this machine.
+    /// Compiles a network for the widest instruction set of this machine, with weights as they are.
     pub fn new(network: &Network) -> Self {
-        Self::with(network, InstructionSet::best())
+        Self::with(network, InstructionSet::best(), Format::F32)
     }
 
-    /// Compiles a network for a given instruction set, or the widest available one below it.
-    pub fn with(network: &Network, instruction_set: InstructionSet) -> Self {
-        let widest = network.layers.iter().map(|layer| layer.outputs.next_multiple_of(ROWS)).max().unwrap_or(0);
+    /// Compiles a network for a given instruction set, or the widest available one below it, with weights of a given format.
+    ///
+    /// With [`Format::I8`] the first and the last layer keep 16 bits: they are small, and what they lose no later layer evens out. What
+    /// rounding the weights of the others does to an average input is put right in their biases.
+    pub fn with(network: &Network, instruction_set: InstructionSet, format: Format) -> Self {
+        let instruction_set = instruction_set.available();
+        let last = network.layers.len().saturating_sub(1);
+        let means = if format == Format::I8 { deviation::mean_inputs(network, MEAN_INPUTS) } else { Vec::new() };
+        let layer = |(index, dense): (usize, &Dense)| {
+            if format == Format::I8 && index > 0 && index < last {
+                Layer::new(dense, instruction_set, format, &means[index])
+            } else {
+                Layer::new(dense, instruction_set, if format == Format::I8 { Format::I16 } else { format }, &[])
+            }
+        };
+        let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
-        let layers = network.layers.iter().map(Layer::new).collect();
+        let layers = network.layers.iter().enumerate().map(layer).collect();
         let input_lanes = lanes(network.input_width);
         let ones = vec![1.0; network.input_width];
         let (shift, scale) = network.input_scale.as_ref().map_or_else(
@@ -77,7 +116,10 @@ impl Plan {
             layers,
             front: zeros(widest),
             back: zeros(widest),
-            instruction_set: instruction_set.available(),
+            #[cfg(target_arch = "x86_64")]
+            digits: Digits::new(widest),
+            instruction_set,
+            format,
         }
     }
 
@@ -96,9 +138,19 @@ impl Plan {
         self.instruction_set
     }
 
-    /// Bytes of weights and biases that one run reads.
+    /// The format of the weights.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The weights as one run reads them, layer by layer: addresses, for prefetching and for benchmarks that evict them.
+    pub fn memory(&self) -> impl Iterator<Item = &[u8]> {
+        self.layers.iter().map(|layer| bytes_of(layer.weights.lines()))
+    }
+
+    /// Bytes of weights that one run reads.
     pub fn bytes(&self) -> usize {
-        self.layers.iter().map(|layer| size_of_val(&*layer.weights) + size_of_val(&*layer.bias)).sum()
+        self.memory().map(<[u8]>::len).sum()
     }
 
     /// Evaluates the network. `input` and `output` must have the plan's widths; what is missing reads as zero, what is too much is
@@ -119,8 +171,13 @@ impl Plan {
             *to = if value.abs() < SMALLEST_WEIGHT { 0.0 } else { value };
         }
         for layer in &self.layers {
-            kernel::dense(self.instruction_set, &layer.weights, &layer.bias, layer.row_lanes, &self.front, &mut self.back);
-            activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.bias.len()]);
+            match &layer.weights {
+                Weights::Rows(rows) => rows.run(self.instruction_set, &layer.bias, &self.front, &mut self.back),
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: tiles are only made where `InstructionSet::available` found VNNI.
+                Weights::Tiles(tiles) => unsafe { tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back) },
+            }
+            activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.lanes]);
             std::mem::swap(&mut self.front, &mut self.back);
         }
         for (to, from) in output.iter_mut().zip(self.front.iter().flat_map(|lane| lane.0)).take(self.output_width) {
@@ -130,16 +187,37 @@ impl Plan {
 }
 
 impl Layer {
-    fn new(dense: &ravenpose_importer::Dense) -> Self {
-        let row_lanes = lanes(dense.inputs);
-        let rows = dense.outputs.next_multiple_of(ROWS);
-        let mut weights = zeros(rows * row_lanes);
-        for (row, from) in dense.weights.chunks_exact(dense.inputs.max(1)).enumerate() {
-            let to = &mut weights[row * row_lanes..(row + 1) * row_lanes];
-            for (to, from) in to.iter_mut().flat_map(|lane| lane.0.iter_mut()).zip(from) {
-                *to = if from.abs() < SMALLEST_WEIGHT { 0.0 } else { *from };
-            }
+    /// `mean` is what goes in on average, if rounding is to be put right for it.
+    fn new(dense: &Dense, set: InstructionSet, format: Format, mean: &[f64]) -> Self {
+        let lanes = lanes(dense.outputs);
+        let kept: Vec<f32> =
+            dense.weights.iter().map(|weight| if weight.abs() < SMALLEST_WEIGHT { 0.0 } else { *weight }).collect();
+        let rows = kept.chunks_exact(dense.inputs.max(1)).zip(&dense.bias);
+        let bias: Vec<f32> = rows.map(|(row, bias)| bias + format.mean_loss(row, mean)).collect();
+        Self {
+            weights: Weights::new(&kept, dense.inputs, set, format),
+            bias: padded(&bias, lanes),
+            lanes,
+            activation: dense.activation,
         }
-        Self { weights, bias: padded(&dense.bias, lanes(rows)), row_lanes, activation: dense.activation }
+    }
+}
+
+impl Weights {
+    fn new(weights: &[f32], inputs: usize, set: InstructionSet, format: Format) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if set == InstructionSet::Avx512Vnni && matches!(format, Format::I16 | Format::I8) && inputs <= TILES_INPUTS_MAX {
+            return Self::Tiles(Tiles::new(weights, inputs, format));
+        }
+        let _ = set;
+        Self::Rows(Rows::new(weights, inputs, format))
+    }
+
+    fn lines(&self) -> &[Line] {
+        match self {
+            Self::Rows(rows) => rows.lines(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Tiles(tiles) => tiles.lines(),
+        }
     }
 }

@@ -2,21 +2,26 @@
 
 use crate::output;
 use ravenpose::model;
-use ravenpose::network::Plan;
+use ravenpose::network::{Format, choose};
 use std::path::Path;
 use std::process::ExitCode;
 
 const INPUTS: usize = 118;
 
 pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str) -> Result<ExitCode, String> {
-    match weights {
-        "f32" => {}
-        "f16" | "bf16" | "i8" => {
-            return Err(format!("--weights {weights}: this version runs float32 weights only; use --weights f32"));
-        }
-        other => return Err(format!("--weights {other:?} is not a weight format; use f32")),
+    let format: Format = weights.parse().map_err(|error| format!("--weights: {error}"))?;
+    let network = model::network(model_path).map_err(|error| error.to_string())?;
+    let choice = choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
+    let mut plan = choice.plan;
+    if format != Format::F32 {
+        let um = |mm: f64| mm * 1000.0;
+        complain!(
+            "weights {format}: at most {:.2} um from float64, {:.2} um RMS, over {} random inputs",
+            um(choice.deviation.worst),
+            um(choice.deviation.rms),
+            choice.deviation.inputs
+        );
     }
-    let mut plan = Plan::new(&model::network(model_path).map_err(|error| error.to_string())?);
     let name = input.display();
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))

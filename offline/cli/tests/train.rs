@@ -50,7 +50,7 @@ impl Drop for Folder {
 }
 
 fn source(path: &Path) -> ModelSource {
-    ModelSource { path: path.to_owned(), sha256: None }
+    ModelSource::new(path.to_owned())
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn the_service_loads_what_was_trained_and_infer_gives_the_golden_outputs() {
         let options = ["train", "--preset", preset, "--epochs", "2", "--truth-noise", "0.5", "--out", text(&out), "--data"];
         let said = good(&ravenpose(&[&options[..], &runs].concat()));
         assert!(said.contains("test (1 trajectories"), "{said}");
-        let (_, card) = model::load(&source(&out)).expect("the service's own checks");
+        let card = model::load(&source(&out)).expect("the service's own checks").card;
         assert!(!card.untrained && card.domain.is_some());
         assert!(card.bound95_mm.iter().all(|bound| *bound > 0.0));
         let header: Vec<String> = (0..118).map(|input| format!("in_{input}")).collect();
@@ -99,7 +99,7 @@ fn runs_after_one_homing_have_its_offset_and_different_motions() {
 #[test]
 fn the_shipped_model_is_trained_and_the_service_takes_it() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/raven2-worn.onnx");
-    let (_, card) = model::load(&source(&path)).expect("the service's own checks");
+    let card = model::load(&source(&path)).expect("the service's own checks").card;
     assert!(!card.untrained && card.trained_on.contains("140.0 minutes"), "{}", card.trained_on);
 }
 

@@ -1,0 +1,202 @@
+//! Matrix times vector in whole numbers: weights of one or two signed bytes, activations of two, exact sums by VNNI.
+//!
+//! Activations become `scale * (256 * high + low)` with one scale for the whole vector; `high` and `low` are stored as unsigned bytes,
+//! 128 too large, as the instruction wants one unsigned operand. What the 128 adds to a sum, it adds for every input alike: it is in
+//! the number that each sum starts from. Of two-byte weights the product of both low digits is left out: it is zero on average and
+//! below what rounding the weights did.
+//!
+//! A tile is sixteen outputs by four inputs, one cache line per digit. Up to eight tiles that use the same inputs lie together, in the
+//! order in which they are read.
+//!
+//! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
+//! compiled for an instruction set that was found on this machine.
+
+#[allow(clippy::wildcard_imports, reason = "vector instructions")]
+use std::arch::x86_64::*;
+
+use super::format::{Format, LARGEST_DIGITS, digits};
+use super::instructions::{LANE, Lane, Line};
+
+/// Inputs of a tile.
+const DEPTH: usize = 4;
+/// Most tiles side by side.
+const WIDTH: usize = 8;
+
+/// Activations as digits, for [`Tiles::run`].
+pub(super) struct Digits {
+    high: Box<[Line]>,
+    low: Box<[Line]>,
+    scale: f32,
+}
+
+impl Digits {
+    /// Room for `lanes` lanes of activations.
+    pub(super) fn new(lanes: usize) -> Self {
+        let room = vec![Line([0; 64]); (lanes * LANE).div_ceil(64)].into_boxed_slice();
+        Self { high: room.clone(), low: room, scale: 0.0 }
+    }
+
+    /// Takes `values` in; with NaN or infinity among them the scale is NaN, and so is every output.
+    #[target_feature(enable = "avx512f")]
+    fn take(&mut self, values: &[Lane]) {
+        assert!(self.high.len() * 64 >= values.len() * LANE && self.low.len() == self.high.len(), "plan buffers disagree");
+        let sign = _mm512_set1_epi32(i32::MAX);
+        let mut largest = _mm512_setzero_si512();
+        for lane in values {
+            // As whole numbers, magnitudes keep their order and NaN is the largest; the maximum of floats would lose it.
+            // SAFETY: a lane is 64 aligned bytes.
+            let bits = unsafe { _mm512_load_si512(lane.0.as_ptr().cast()) };
+            largest = _mm512_max_epi32(largest, _mm512_and_si512(bits, sign));
+        }
+        let largest = f32::from_bits(_mm512_reduce_max_epi32(largest).cast_unsigned());
+        let usable = largest.is_finite() && largest >= super::SMALLEST_WEIGHT;
+        self.scale = if usable { largest / LARGEST_DIGITS } else { largest * 0.0 };
+        let inverse = _mm512_set1_ps(if usable { LARGEST_DIGITS / largest } else { 0.0 });
+        let offset = _mm512_set1_epi32(128);
+        let (high, low) = (self.high.as_mut_ptr().cast::<u8>(), self.low.as_mut_ptr().cast::<u8>());
+        for (index, lane) in values.iter().enumerate() {
+            // SAFETY: a lane is 64 aligned bytes; 16 bytes per lane fit into both buffers, which was checked above.
+            unsafe {
+                let number = _mm512_cvtps_epi32(_mm512_mul_ps(_mm512_load_ps(lane.0.as_ptr()), inverse));
+                let top = _mm512_srai_epi32::<8>(_mm512_add_epi32(number, offset));
+                let rest = _mm512_sub_epi32(number, _mm512_slli_epi32::<8>(top));
+                _mm_store_si128(high.add(index * LANE).cast(), _mm512_cvtepi32_epi8(_mm512_add_epi32(top, offset)));
+                _mm_store_si128(low.add(index * LANE).cast(), _mm512_cvtepi32_epi8(_mm512_add_epi32(rest, offset)));
+            }
+        }
+    }
+}
+
+/// A layer's weights.
+pub(super) struct Tiles {
+    lines: Box<[Line]>,
+    /// Groups of four inputs.
+    groups: usize,
+    /// Tiles side by side in the whole layer.
+    tiles: usize,
+    two: bool,
+    /// What each sum starts from, by output: with the weights' only or high digit, and with the low one added for two.
+    start: Box<[[i32; LANE]]>,
+    start_mixed: Box<[[i32; LANE]]>,
+    scale: Box<[Lane]>,
+}
+
+impl Tiles {
+    /// Packs `weights`, row by row of `inputs` numbers, as `I8` or `I16`.
+    pub(super) fn new(weights: &[f32], inputs: usize, format: Format) -> Self {
+        let two = format == Format::I16;
+        let digits_per_weight = if two { 2 } else { 1 };
+        let outputs = weights.len() / inputs.max(1);
+        let (groups, tiles) = (inputs.div_ceil(DEPTH), outputs.div_ceil(LANE));
+        let mut packed = Self {
+            lines: vec![Line([0; 64]); groups * tiles * digits_per_weight].into_boxed_slice(),
+            groups,
+            tiles,
+            two,
+            start: vec![[0; LANE]; tiles].into_boxed_slice(),
+            start_mixed: vec![[0; LANE]; tiles].into_boxed_slice(),
+            scale: super::zeros(tiles),
+        };
+        for (row, weights) in weights.chunks_exact(inputs.max(1)).enumerate() {
+            let scale = format.row_scale(weights);
+            let (tile, place) = (row / LANE, row % LANE);
+            // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `finish` has the rest.
+            packed.scale[tile].0[place] = if two { 256.0 * scale } else { scale };
+            let panel = tile / WIDTH * WIDTH;
+            let side_by_side = (tiles - panel).min(WIDTH);
+            for (column, weight) in weights.iter().enumerate() {
+                let number = format.round(*weight, scale);
+                let line = (panel * groups + column / DEPTH * side_by_side + tile - panel) * digits_per_weight;
+                let byte = place * DEPTH + column % DEPTH;
+                let (high, low) = if two { digits(number) } else { (number, 0) };
+                packed.lines[line].0[byte] = (high as i8).cast_unsigned();
+                packed.start[tile][place] -= 128 * high;
+                packed.start_mixed[tile][place] -= 128 * (high + low);
+                if two {
+                    packed.lines[line + 1].0[byte] = (low as i8).cast_unsigned();
+                }
+            }
+        }
+        packed
+    }
+
+    pub(super) fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// `output = weights * input + bias`; `digits` is room to work in.
+    ///
+    /// # Safety
+    /// AVX-512F and VNNI must be present.
+    #[target_feature(enable = "avx512f,avx512vnni")]
+    pub(super) unsafe fn run(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
+        let lanes = (self.groups * DEPTH).div_ceil(LANE);
+        assert!(input.len() >= lanes && bias.len() >= self.tiles && output.len() >= self.tiles, "plan buffers disagree");
+        digits.take(&input[..lanes]);
+        let mut first = 0;
+        while first < self.tiles {
+            let width = (self.tiles - first).min(WIDTH);
+            // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide.
+            unsafe {
+                match width {
+                    1 => self.panel::<1>(first, bias, digits, output),
+                    2 => self.panel::<2>(first, bias, digits, output),
+                    3 => self.panel::<3>(first, bias, digits, output),
+                    4 => self.panel::<4>(first, bias, digits, output),
+                    5 => self.panel::<5>(first, bias, digits, output),
+                    6 => self.panel::<6>(first, bias, digits, output),
+                    7 => self.panel::<7>(first, bias, digits, output),
+                    _ => self.panel::<8>(first, bias, digits, output),
+                }
+            }
+            first += width;
+        }
+    }
+
+    /// # Safety
+    /// As [`Tiles::run`], and tiles `first..first + N` must exist and lie together.
+    #[target_feature(enable = "avx512f,avx512vnni")]
+    unsafe fn panel<const N: usize>(&self, first: usize, bias: &[Lane], digits: &Digits, output: &mut [Lane]) {
+        let (high, low) = (digits.high.as_ptr().cast::<i32>(), digits.low.as_ptr().cast::<i32>());
+        let scale = _mm512_set1_ps(digits.scale);
+        // SAFETY: `run` checked the lengths and `new` made them: `groups` words of activations, `groups * N` tiles from the panel's
+        // first, a start and a scale for each.
+        unsafe {
+            let start = |of: &[[i32; LANE]], tile: usize| _mm512_loadu_si512(of[first + tile].as_ptr().cast());
+            let mut tops: [__m512i; N] = std::array::from_fn(|tile| start(&self.start, tile));
+            let mut rests: [__m512i; N] =
+                std::array::from_fn(|tile| start(if self.two { &self.start_mixed } else { &self.start }, tile));
+            if self.two {
+                let mut w = self.lines.as_ptr().add(first * self.groups * 2).cast::<i32>();
+                for group in 0..self.groups {
+                    let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
+                    for tile in 0..N {
+                        let weight = _mm512_load_si512(w.add(tile * 32).cast());
+                        let weight_rest = _mm512_load_si512(w.add(tile * 32 + 16).cast());
+                        tops[tile] = _mm512_dpbusd_epi32(tops[tile], top, weight);
+                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], rest, weight);
+                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], top, weight_rest);
+                    }
+                    w = w.add(N * 32);
+                }
+            } else {
+                let mut w = self.lines.as_ptr().add(first * self.groups).cast::<i32>();
+                for group in 0..self.groups {
+                    let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
+                    for tile in 0..N {
+                        let weight = _mm512_load_si512(w.add(tile * 16).cast());
+                        tops[tile] = _mm512_dpbusd_epi32(tops[tile], top, weight);
+                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], rest, weight);
+                    }
+                    w = w.add(N * 16);
+                }
+            }
+            for tile in 0..N {
+                let at = first + tile;
+                let sum = _mm512_fmadd_ps(_mm512_cvtepi32_ps(tops[tile]), _mm512_set1_ps(256.0), _mm512_cvtepi32_ps(rests[tile]));
+                let factor = _mm512_mul_ps(scale, _mm512_load_ps(self.scale[at].0.as_ptr()));
+                _mm512_store_ps(output[at].0.as_mut_ptr(), _mm512_fmadd_ps(sum, factor, _mm512_load_ps(bias[at].0.as_ptr())));
+            }
+        }
+    }
+}
