@@ -78,6 +78,14 @@ fn padded(values: &[f32], count: usize) -> Box<[Lane]> {
     out
 }
 
+fn scaled(from: &[f32; LANE], shift: &Lane, scale: &Lane) -> Lane {
+    Lane(std::array::from_fn(|index| {
+        let value = (from[index] - shift.0[index]) * scale.0[index];
+        // Denormals are slow on some processors and mean nothing here. NaN is not smaller: it passes.
+        if value.abs() < SMALLEST_WEIGHT { 0.0 } else { value }
+    }))
+}
+
 impl Plan {
     /// Compiles a network for the widest instruction set of this machine, with weights as they are.
     pub fn new(network: &Network) -> Self {
@@ -156,19 +164,21 @@ impl Plan {
     /// Evaluates the network. `input` and `output` must have the plan's widths; what is missing reads as zero, what is too much is
     /// ignored. NaN and infinity propagate; callers check inputs before and outputs after.
     pub fn run(&mut self, input: &[f32], output: &mut [f32]) {
-        for lane in &mut self.front {
-            lane.0 = [0.0; LANE];
+        let given = input.len().min(self.input_width);
+        let (whole, rest) = input[..given].as_chunks::<LANE>();
+        let steps = self.shift.iter().zip(&*self.scale);
+        for ((to, from), (shift, scale)) in self.front.iter_mut().zip(whole).zip(steps.clone()) {
+            *to = scaled(from, shift, scale);
         }
-        for ((to, from), (shift, scale)) in self
-            .front
-            .iter_mut()
-            .flat_map(|lane| lane.0.iter_mut())
-            .zip(input.iter().take(self.input_width))
-            .zip(self.shift.iter().flat_map(|lane| lane.0).zip(self.scale.iter().flat_map(|lane| lane.0)))
-        {
-            let value = (from - shift) * scale;
-            // Denormals are slow on some processors and mean nothing here. NaN is not smaller: it passes.
-            *to = if value.abs() < SMALLEST_WEIGHT { 0.0 } else { value };
+        if let Some((to, (shift, scale))) = self.front.iter_mut().zip(steps).nth(whole.len()) {
+            let mut last = [0.0; LANE];
+            last[..rest.len()].copy_from_slice(rest);
+            *to = scaled(&last, shift, scale);
+            // What pads has neither shift nor scale; what was not given reads as zero.
+            to.0[rest.len()..].fill(0.0);
+        }
+        for lane in self.front.iter_mut().skip(whole.len() + 1) {
+            lane.0 = [0.0; LANE];
         }
         for layer in &self.layers {
             match &layer.weights {
