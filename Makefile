@@ -57,9 +57,9 @@ examples: stage
 	for f in bridge/examples/cxx/*.cpp; do \
 	  $(CXX) -std=c++17 $(CFLAGS_STRICT) -I$(STAGE)/include $$f -o $(STAGE)/bin/$$(basename $$f .cpp) -L$(STAGE)/lib -lravenpose_bridge $(RPATH) || exit 1; done
 
-# RUN=FILE plays a recording of your own.
+# RUN=FILE plays a recording of your own, MODEL=FILE with a model of your own.
 demo: offline examples
-	bridge/examples/demo.sh "$(RUN)"
+	bridge/examples/demo.sh "$(RUN)" $(if $(MODEL),"$(MODEL)")
 
 # The official iceoryx2 package for the independent client, and CMake for the packaging test.
 # Where there is none to be had, the tests that want them say that they skip.

@@ -130,6 +130,9 @@ int main(int argc, char **argv) try {
   ravenpose::Options options;
   options.queue_depth = 64;
   ravenpose::PoseReader reader(options);
+  // Whoever plays the states waits for this.
+  std::printf("connected\n");
+  std::fflush(stdout);
   mlockall(MCL_CURRENT | MCL_FUTURE);
   std::vector<int64_t> to_service, in_service, to_client, whole;
   for (auto *values : {&to_service, &in_service, &to_client, &whole}) values->reserve(states.size());
