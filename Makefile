@@ -85,8 +85,9 @@ faults: build
 bench-ci: build
 	target/release/ravenpose-bench ci
 
-bench: build bench-offline
-	target/release/ravenpose-bench full
+# Writes docs/performance.md and build/bench/results.json.
+bench: build venv bench-offline
+	target/release/ravenpose-bench full --write
 
 # Simulator and recordings: times real time, MB/s, peak memory.
 bench-offline: offline

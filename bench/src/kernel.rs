@@ -189,9 +189,13 @@ fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Ve
         }
         let floor = if format == Format::I16 { floor - 3 } else { floor };
         let narrow = Plan::with(network, InstructionSet::Avx2, format);
+        let portable = Plan::with(network, InstructionSet::Portable, format);
         let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
         all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
         all.push(Contender::new(name(&narrow), Engine::Plan(Box::new(narrow)), floor, &usual));
+        if format == Format::I16 {
+            all.push(Contender::new(name(&portable), Engine::Plan(Box::new(portable)), floor, &usual));
+        }
     }
     match onnxruntime::library() {
         Some(library) => {
@@ -209,6 +213,12 @@ fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Ve
         (0..INPUTS).map(|row| (0..118).map(|i| if (row * 7 + i) % 3 == 0 { 1e4 } else { -1e4 }).collect()).collect();
     all.push(Contender::new("  ravenpose f32, saturated sigmoids".to_owned(), plan(), 0, &saturating));
     Ok(all)
+}
+
+/// Time of float32 on the widest instruction set over that of tract, in the tight loop.
+pub(crate) fn ratio_to_tract(tables: &[Table]) -> Option<f64> {
+    let name = format!("  ravenpose f32, {}", InstructionSet::best().name());
+    tables.iter().find_map(|table| table.find(&name))?.last().copied()
 }
 
 /// Rows of the contenders, whose times are taken away.

@@ -29,6 +29,21 @@ impl Table {
         self.rows.iter().find(|(row, _)| row == name).map(|(_, values)| values.as_slice())
     }
 
+    /// The title without its unit.
+    pub(crate) fn heading(&self) -> &str {
+        self.title.split(", us").next().unwrap_or(&self.title)
+    }
+
+    /// Rows by name, cells by column; what was not measured is null.
+    pub(crate) fn json(&self) -> serde_json::Value {
+        let cells = |values: &[f64]| {
+            self.columns.iter().cloned().zip(values.iter().map(|value| serde_json::json!(value))).collect::<serde_json::Map<_, _>>()
+        };
+        let rows: Vec<_> =
+            self.rows.iter().map(|(name, values)| serde_json::json!({ "name": name.trim(), "values": cells(values) })).collect();
+        serde_json::json!({ "title": self.title, "rows": rows })
+    }
+
     pub(crate) fn row(&mut self, name: &str, values: &[f64]) {
         self.rows.push((name.to_owned(), values.to_vec()));
     }

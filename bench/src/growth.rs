@@ -1,0 +1,88 @@
+//! How the time grows: with the size of the network, and with the number of networks that share a core.
+
+use crate::table::{Table, quantiles};
+use ravenpose::network::{Format, InstructionSet, Plan};
+use ravenpose_importer::{Activation, Dense, Network};
+use ravenpose_transport::now_ns;
+
+/// Widths of the three hidden layers.
+const WIDTHS: [usize; 6] = [32, 100, 250, 550, 1200, 2200];
+/// Networks that take turns.
+const STREAMS: [usize; 3] = [1, 2, 8];
+const ROUNDS: usize = 3;
+
+/// 118 inputs, three hidden layers of this width, 3 outputs, random weights.
+fn network(width: usize) -> Network {
+    let mut state = 1_u64;
+    let mut number = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / 16_777_216.0 - 0.5
+    };
+    let widths = [118, width, width, width, 3];
+    let layers = widths.windows(2).map(|ends| {
+        let spread = (6.0 / ends[0] as f32).sqrt();
+        Dense {
+            inputs: ends[0],
+            outputs: ends[1],
+            weights: (0..ends[0] * ends[1]).map(|_| number() * spread).collect(),
+            bias: vec![0.0; ends[1]],
+            activation: if ends[1] == 3 { Activation::Identity } else { Activation::Sigmoid },
+        }
+    });
+    let layers = layers.collect();
+    Network { input_width: 118, output_width: 3, input_scale: None, layers, metadata: std::collections::BTreeMap::new() }
+}
+
+/// Median time of one turn of all plans, µs: the smallest of some rounds.
+fn time(plans: &mut [Plan]) -> f64 {
+    let bytes: usize = plans.iter().map(Plan::bytes).sum();
+    let runs = (400_000_000 / bytes.max(1)).clamp(20, 4000);
+    let input = [0.3_f32; 118];
+    let mut output = [0.0_f32; 3];
+    let mut best = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let mut taken: Vec<i64> = (0..runs)
+            .map(|_| {
+                let start = now_ns();
+                for plan in &mut *plans {
+                    plan.run(&input, &mut output);
+                }
+                now_ns() - start
+            })
+            .collect();
+        best = best.min(quantiles(&mut taken)[0]);
+    }
+    std::hint::black_box(output);
+    best
+}
+
+/// Both tables.
+pub(crate) fn run() -> Vec<Table> {
+    let plan = |network: &Network, format| Plan::with(network, InstructionSet::best(), format);
+    let mut sizes =
+        Table::new("Growth with the network: 118-w-w-w-3, median us", &["weights k", "i16 MB", "i16", "GB/s", "f32", "GB/s"]);
+    for width in WIDTHS {
+        let network = network(width);
+        let weights: usize = network.layers.iter().map(|layer| layer.weights.len()).sum();
+        let mut row = vec![weights as f64 / 1e3];
+        for format in [Format::I16, Format::F32] {
+            let mut plans = [plan(&network, format)];
+            let (bytes, time_us) = (plans[0].bytes() as f64, time(&mut plans));
+            if format == Format::I16 {
+                row.push(bytes / 1e6);
+            }
+            row.extend([time_us, bytes / time_us / 1e3]);
+        }
+        sizes.row(&format!("w = {width}"), &row);
+    }
+    let mut streams =
+        Table::new("Growth with the arms on one core: 118-550-550-550-3, median us for all", &["i16 MB", "i16", "per arm"]);
+    let network = network(550);
+    for count in STREAMS {
+        let mut plans: Vec<Plan> = (0..count).map(|_| plan(&network, Format::I16)).collect();
+        let bytes: usize = plans.iter().map(Plan::bytes).sum();
+        let time_us = time(&mut plans);
+        streams.row(&format!("{count} networks in turn"), &[bytes as f64 / 1e6, time_us, time_us / count as f64]);
+    }
+    vec![sizes, streams]
+}

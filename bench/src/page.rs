@@ -1,0 +1,51 @@
+//! `docs/performance.md` and `results.json`, from the tables of one run.
+
+use crate::table::Table;
+use serde_json::json;
+use std::path::Path;
+
+const PAGE: &str = "# Performance
+
+Written by `make bench` (`ravenpose-bench full --write`), every table of it in one run of one machine. Such machines are shared and noisy:
+compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `sleep`, `spin`,
+`event`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
+
+- *floor*: reading the same bytes of weights once, with nothing else done.
+- *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
+- *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
+- *avx512vnni*: whole-number sums for i16 and i8, float32 otherwise; *avx2+fma*: float32 sums for all ([decision 0013](decisions/0013-small-weights.md)).
+- The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth
+  counts; beyond, the next one's.
+";
+
+/// Writes both files; the page to `docs/performance.md`.
+pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
+    let mut page = format!("{PAGE}\nMachine: {machine}.\n");
+    for table in tables {
+        page.push_str(&format!("\n## {}\n\n```text\n{table}```\n", table.heading()));
+    }
+    whole(Path::new("docs/performance.md"), &page)?;
+    let tables: Vec<_> = tables.iter().map(Table::json).collect();
+    let results =
+        json!({ "schema": "ravenpose-bench/1", "machine": machine, "unit": "us unless a column says otherwise", "tables": tables });
+    std::fs::create_dir_all("build/bench").map_err(|cause| format!("build/bench: {cause}"))?;
+    whole(Path::new("build/bench/results.json"), &format!("{results:#}\n"))
+}
+
+fn whole(path: &Path, text: &str) -> Result<(), String> {
+    let beside = path.with_extension("new");
+    let done = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));
+    done.map_err(|cause| format!("{}: cannot be written: {cause}", path.display()))
+}
+
+/// Processor and kernel, as the machine names them.
+pub(crate) fn machine() -> String {
+    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let cpu = read("/proc/cpuinfo");
+    let name = cpu
+        .lines()
+        .find_map(|line| line.strip_prefix("model name"))
+        .map_or("unknown processor", |rest| rest.trim_start_matches([' ', '\t', ':']));
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    format!("{name}, {cores} cores, Linux {}", read("/proc/sys/kernel/osrelease").trim())
+}
