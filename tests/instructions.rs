@@ -1,0 +1,95 @@
+//! Instructions per cycle, counted by valgrind: the same on every machine and at any load, where times are not.
+//!
+//! A change of more than 2 % fails, in either direction: note the new number here, with the reason in the commit.
+
+#[path = "faults/world.rs"]
+#[expect(dead_code, reason = "shared with the tests of faults, which use all of it")]
+mod world;
+
+use ravenpose::cycle::Limits;
+use ravenpose::network::{Format, InstructionSet, Plan};
+use ravenpose_importer::{Activation, Dense, Network};
+use ravenpose_wire::{CorrectedPose, RavenState};
+use std::process::Command;
+use world::MS;
+
+/// The compiler whose code was counted.
+const COMPILER: &str = "rustc 1.95.0";
+/// Taking a state of both arms, features, guards, correction and pose; all but the network.
+const LOOP: f64 = 4_493.0;
+/// The 600-500-400 network with weights of 16 bits, on AVX2: the widest that valgrind knows.
+const NETWORK: f64 = 292_388.0;
+const TOLERANCE: f64 = 0.02;
+/// Cycles of the shorter and of the longer run; the rest of both is the same.
+const RUNS: [usize; 2] = [20, 220];
+
+fn part(name: &str, runs: usize) {
+    if name == "loop" {
+        let states: Vec<RavenState> = (1..=RUNS[1] as u64).map(|step| world::state(7, step, step, step as i64 * MS)).collect();
+        let mut cycle = world::cycle(Limits::default());
+        let mut pose = CorrectedPose::new();
+        for state in &states[..runs] {
+            let now = state.source_time_ns;
+            cycle.offer(state, now);
+            assert!(cycle.step(now, &mut (), &mut pose));
+            cycle.finish(now + 40_000, false, &mut pose);
+        }
+        std::hint::black_box(&pose);
+    } else {
+        // Reading a model from its file would take valgrind a minute.
+        let layers = [118, 600, 500, 400, 3].windows(2).map(|ends| Dense {
+            inputs: ends[0],
+            outputs: ends[1],
+            weights: (0..ends[0] * ends[1]).map(|i| ((i * 7919) % 2003) as f32 * 1e-4 - 0.1).collect(),
+            bias: vec![0.1; ends[1]],
+            activation: if ends[1] == 3 { Activation::Identity } else { Activation::Sigmoid },
+        });
+        let layers = layers.collect();
+        let network =
+            Network { input_width: 118, output_width: 3, input_scale: None, layers, metadata: std::collections::BTreeMap::new() };
+        let mut plan = Plan::with(&network, InstructionSet::Avx2, Format::I16);
+        let mut output = [0.0_f32; 3];
+        for run in 0..runs {
+            plan.run(&[run as f32; 118], &mut output);
+        }
+        std::hint::black_box(output);
+    }
+}
+
+/// Instructions of this test as a process of its own with a part to play.
+fn count(name: &str, runs: usize) -> Option<f64> {
+    let this = std::env::current_exe().expect("this program");
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(this)
+        .args(["--exact", "a_cycle_takes_the_instructions_that_it_took", "--test-threads=1"])
+        .env("RAVENPOSE_COUNT_PART", format!("{name} {runs}"))
+        .output()
+        .ok()?;
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words}");
+    words.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
+}
+
+#[test]
+fn a_cycle_takes_the_instructions_that_it_took() {
+    if let Ok(wanted) = std::env::var("RAVENPOSE_COUNT_PART") {
+        let (name, runs) = wanted.split_once(' ').expect("a part and a number");
+        return part(name, runs.parse().expect("a number"));
+    }
+    let version = Command::new("rustc").arg("--version").output().map(|output| output.stdout).unwrap_or_default();
+    if !String::from_utf8_lossy(&version).starts_with(COMPILER) {
+        return println!("skipped: instructions were counted with {COMPILER}");
+    }
+    if InstructionSet::Avx2.available() != InstructionSet::Avx2 {
+        return println!("skipped: instructions were counted with AVX2");
+    }
+    for (name, expected) in [("loop", LOOP), ("network", NETWORK)] {
+        let [Some(few), Some(many)] = RUNS.map(|runs| count(name, runs)) else {
+            return println!("skipped: valgrind is absent");
+        };
+        let found = (many - few) / (RUNS[1] - RUNS[0]) as f64;
+        println!("{name}: {found:.0} instructions per cycle, {expected} noted");
+        assert!((found / expected - 1.0).abs() <= TOLERANCE, "{name}: {found:.0} instructions per cycle, {expected} noted");
+    }
+}
