@@ -856,7 +856,7 @@ fn the_smallest_weights_that_are_exact_enough_are_chosen_and_a_format_that_is_no
         if format == Format::F32 {
             assert!(narrow.is_ok(), "float32 is the network as it came");
         } else {
-            let line = narrow.err().expect("a refusal").to_string();
+            let line = narrow.expect_err("a refusal").to_string();
             assert!(line.contains(&format!("untrained.onnx: weights of format {format} deviate by up to 0.0")), "{line}");
             assert!(line.ends_with("choose another format, weights = \"auto\", or raise weights_deviation_um"), "{line}");
         }

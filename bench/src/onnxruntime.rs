@@ -13,7 +13,7 @@ const API_VERSION: u32 = 17;
 /// A session with one thread and bound memory. Never freed: the benchmark has one, to its end.
 pub(crate) struct Session {
     api: &'static sys::OrtApi,
-    session: *mut sys::OrtSession,
+    handle: *mut sys::OrtSession,
     binding: *mut sys::OrtIoBinding,
     input: &'static mut [f32],
     output: &'static mut [f32],
@@ -80,14 +80,14 @@ impl Session {
             ok((api.CreateIoBinding)(session, &raw mut binding))?;
             ok((api.BindInput)(binding, input_name.as_ptr(), tensor(input)?))?;
             ok((api.BindOutput)(binding, output_name.as_ptr(), tensor(output)?))?;
-            Ok(Self { api, session, binding, input, output, version })
+            Ok(Self { api, handle: session, binding, input, output, version })
         }
     }
 
     pub(crate) fn run(&mut self, input: &[f32]) -> f32 {
         self.input.copy_from_slice(input);
         // SAFETY: session and binding were made by this interface and live as long as this.
-        let status = unsafe { (self.api.RunWithBinding)(self.session, null(), self.binding) };
+        let status = unsafe { (self.api.RunWithBinding)(self.handle, null(), self.binding) };
         if let Err(message) = check(self.api, status) {
             eprintln!("onnxruntime: {message}");
         }

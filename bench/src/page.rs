@@ -2,6 +2,7 @@
 
 use crate::table::Table;
 use serde_json::json;
+use std::fmt::Write as _;
 use std::path::Path;
 
 const PAGE: &str = "# Performance
@@ -22,7 +23,7 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
     let mut page = format!("{PAGE}\nMachine: {machine}.\n");
     for table in tables {
-        page.push_str(&format!("\n## {}\n\n```text\n{table}```\n", table.heading()));
+        let _ = write!(page, "\n## {}\n\n```text\n{table}```\n", table.heading());
     }
     whole(Path::new("docs/performance.md"), &page)?;
     let tables: Vec<_> = tables.iter().map(Table::json).collect();

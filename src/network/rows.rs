@@ -17,7 +17,7 @@ pub(super) struct Rows {
     lines: Box<[Line]>,
     /// Lanes of one row.
     row_lanes: usize,
-    rows: usize,
+    height: usize,
     format: Format,
     /// One per row, by lanes; rows that pad have 0.
     scale: Box<[Lane]>,
@@ -41,7 +41,7 @@ impl Rows {
                 lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&format.encode(*weight, row_scale)[..bytes]);
             }
         }
-        Self { lines, row_lanes, rows, format, scale }
+        Self { lines, row_lanes, height: rows, format, scale }
     }
 
     pub(super) fn lines(&self) -> &[Line] {
@@ -50,10 +50,10 @@ impl Rows {
 
     /// `output = weights * input + bias`.
     pub(super) fn run(&self, set: InstructionSet, bias: &[Lane], input: &[Lane], output: &mut [Lane]) {
-        let lanes = self.rows.div_ceil(LANE);
+        let lanes = self.height.div_ceil(LANE);
         assert!(
-            self.lines.len() * 64 >= self.rows * self.row_lanes * LANE * self.format.bytes()
-                && self.rows.is_multiple_of(ROWS)
+            self.lines.len() * 64 >= self.height * self.row_lanes * LANE * self.format.bytes()
+                && self.height.is_multiple_of(ROWS)
                 && self.scale.len() == lanes
                 && bias.len() >= lanes
                 && output.len() >= lanes
@@ -90,7 +90,7 @@ impl Rows {
 
     fn sums<const BYTES: usize>(&self, input: &[Lane], output: &mut [Lane], read: impl Fn(&[u8; BYTES]) -> f32) {
         let (weights, _) = bytes_of(&self.lines).as_chunks::<BYTES>();
-        for (group, weights) in weights.chunks_exact(self.row_lanes * LANE * ROWS).take(self.rows / ROWS).enumerate() {
+        for (group, weights) in weights.chunks_exact(self.row_lanes * LANE * ROWS).take(self.height / ROWS).enumerate() {
             let mut sums = [[0.0_f32; LANE]; ROWS];
             for (weights, x) in weights.chunks_exact(LANE * ROWS).zip(input) {
                 for (weights, sums) in weights.chunks_exact(LANE).zip(&mut sums) {
@@ -186,7 +186,7 @@ mod x86 {
                 unsafe {
                     let load = |$at: *const u8| $load;
                     let mut w = rows.lines.as_ptr().cast::<u8>();
-                    for group in 0..rows.rows / ROWS {
+                    for group in 0..rows.height / ROWS {
                         let mut sums = [_mm512_setzero_ps(); 2 * ROWS];
                         let mut lane = 0;
                         while lane + 2 <= rows.row_lanes {
@@ -234,7 +234,7 @@ mod x86 {
                 unsafe {
                     let load = |$at: *const u8| $load;
                     let mut w = rows.lines.as_ptr().cast::<u8>();
-                    for group in 0..rows.rows / ROWS {
+                    for group in 0..rows.height / ROWS {
                         let mut sums = [_mm256_setzero_ps(); 2 * ROWS];
                         for lane in 0..rows.row_lanes {
                             let x0 = _mm256_load_ps(x.add(lane * LANE));

@@ -73,7 +73,7 @@ pub(super) struct Tiles {
     /// Groups of four inputs.
     groups: usize,
     /// Tiles side by side in the whole layer.
-    tiles: usize,
+    across: usize,
     two: bool,
     /// What each sum starts from, by output: with the weights' only or high digit, and with the low one added for two.
     start: Box<[[i32; LANE]]>,
@@ -91,7 +91,7 @@ impl Tiles {
         let mut packed = Self {
             lines: vec![Line([0; 64]); groups * tiles * digits_per_weight].into_boxed_slice(),
             groups,
-            tiles,
+            across: tiles,
             two,
             start: vec![[0; LANE]; tiles].into_boxed_slice(),
             start_mixed: vec![[0; LANE]; tiles].into_boxed_slice(),
@@ -131,11 +131,11 @@ impl Tiles {
     #[target_feature(enable = "avx512f,avx512vnni")]
     pub(super) unsafe fn run(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
-        assert!(input.len() >= lanes && bias.len() >= self.tiles && output.len() >= self.tiles, "plan buffers disagree");
+        assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
         let mut first = 0;
-        while first < self.tiles {
-            let width = (self.tiles - first).min(WIDTH);
+        while first < self.across {
+            let width = (self.across - first).min(WIDTH);
             // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide.
             unsafe {
                 match width {
