@@ -339,24 +339,23 @@ impl Search<'_, '_> {
         let grams = &self.grams(others, None);
         let base = self.scorer.fit(grams);
         self.scorer.untempered();
-        let mut all = parallel(&self.candidates, &|candidate| self.score(grams, &base, candidate));
-        sort(&mut all);
+        let mut claims = best_claims(self.candidates.len(), &|k| self.score(grams, &base, &self.candidates[k]));
+        sort(&mut claims);
+        let mut claims = distinct(&claims);
         // Effects that begin or end on the way: the claims that do something, again, in windows.
-        let begun: Vec<Candidate> = {
-            let windows = self.windows();
-            let worth = distinct(&all)
-                .into_iter()
-                .take(CLAIMS_IN_WINDOWS)
-                .filter(|s| s.gain.nats > 3.0 && !ALWAYS.contains(&s.candidate.family.physics));
-            worth
-                .flat_map(|s| windows.iter().map(move |w| (s.candidate.clone(), *w)))
-                .map(|(c, w)| c.within(self.problem, w))
-                .filter(Candidate::shows)
-                .collect()
-        };
-        all.extend(parallel(&begun, &|candidate| self.score(grams, &base, candidate)));
-        sort(&mut all);
-        let mut claims = distinct(&all);
+        let windows = self.windows();
+        let worth: Vec<Candidate> = claims
+            .iter()
+            .take(CLAIMS_IN_WINDOWS)
+            .filter(|s| s.gain.nats > 3.0 && !ALWAYS.contains(&s.candidate.family.physics))
+            .map(|s| s.candidate.clone())
+            .collect();
+        claims.extend(best_claims(worth.len() * windows.len(), &|k| {
+            let candidate = worth[k / windows.len()].within(self.problem, windows[k % windows.len()]);
+            if candidate.shows() { self.score(grams, &base, &candidate) } else { None }
+        }));
+        sort(&mut claims);
+        let mut claims = distinct(&claims);
         // Between the grid's points, for those that may win.
         let best = claims.first().map_or(0.0, |s| s.score);
         for scored in claims.iter_mut().take(6).filter(|s| s.score > 3.0 && s.score > 0.1 * best) {
@@ -489,11 +488,22 @@ fn distinct(sorted: &[Scored]) -> Vec<Scored> {
     out
 }
 
-fn parallel(candidates: &[Candidate], score: &(dyn Fn(&Candidate) -> Option<Scored> + Sync)) -> Vec<Scored> {
-    let (left, right) = candidates.split_at(candidates.len() / 2);
+/// The best of every claim among so many candidates, the first of equals. What loses is dropped at once: with its columns it
+/// would take as much memory as the whole library.
+fn best_claims(count: usize, score: &(dyn Fn(usize) -> Option<Scored> + Sync)) -> Vec<Scored> {
+    let best = |range: std::ops::Range<usize>| {
+        range.filter_map(score).fold(Vec::new(), |mut best: Vec<Scored>, scored| {
+            match best.iter_mut().find(|other| other.candidate.same_claim(&scored.candidate)) {
+                Some(other) if scored.score > other.score => *other = scored,
+                Some(_) => {}
+                None => best.push(scored),
+            }
+            best
+        })
+    };
     std::thread::scope(|scope| {
-        let other = scope.spawn(|| right.iter().filter_map(score).collect::<Vec<_>>());
-        let mut all: Vec<Scored> = left.iter().filter_map(score).collect();
+        let other = scope.spawn(|| best(count / 2..count));
+        let mut all = best(0..count / 2);
         all.extend(other.join().expect("no panic in scoring"));
         all
     })

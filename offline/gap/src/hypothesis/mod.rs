@@ -170,8 +170,8 @@ pub struct Candidate {
     pub shape: Vec<f64>,
     /// When it is there; none: always.
     pub window: Option<Window>,
-    /// One per coefficient.
-    pub columns: Vec<Column>,
+    /// One per coefficient; shared, since candidates are copied where they are compared.
+    pub columns: Arc<Vec<Column>>,
 }
 
 impl Candidate {
@@ -186,7 +186,7 @@ impl Candidate {
                 *column = column.within(dictionary.problem, window);
             }
         }
-        Self { family: family.clone(), shape: shape.to_vec(), window, columns }
+        Self { family: family.clone(), shape: shape.to_vec(), window, columns: Arc::new(columns) }
     }
 
     /// Numbers of its window that lie in the runs.
@@ -197,7 +197,7 @@ impl Candidate {
     /// The same within a window.
     #[must_use]
     pub fn within(&self, problem: &crate::problem::Problem, window: Window) -> Self {
-        let columns = self.columns.iter().map(|column| column.within(problem, window)).collect();
+        let columns = Arc::new(self.columns.iter().map(|column| column.within(problem, window)).collect());
         Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns }
     }
 
