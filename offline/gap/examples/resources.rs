@@ -1,5 +1,6 @@
 //! Seconds and memory of each stage of an analysis: `resources REAL [SIM]`, recordings of the built-in arm. For development.
 use gap::analysis::{Given, Options, analyse};
+use gap::needed::keep_needed;
 use gap::search::Thresholds;
 use recordings::open::{Opened, open};
 use recordings::tidy::{self, StateTable};
@@ -8,7 +9,7 @@ use simulator::model::RobotModel;
 use std::path::Path;
 use std::time::Instant;
 
-fn read(path: &str) -> Recording {
+fn read(path: &str, model: &RobotModel) -> Recording {
     let mut source = match open(Path::new(path)).expect("a recording") {
         Opened::Table(source) => source,
         Opened::States(source) => {
@@ -16,7 +17,9 @@ fn read(path: &str) -> Recording {
             Box::new(StateTable::new(source, options).expect("states"))
         }
     };
-    table::collect(path, source.as_mut()).expect("a table")
+    let mut recording = table::collect(path, source.as_mut()).expect("a table");
+    keep_needed(&mut recording, model);
+    recording
 }
 
 /// Resident memory now and at its peak, MiB; of Linux.
@@ -32,14 +35,15 @@ fn memory() -> String {
 fn main() {
     let begun = Instant::now();
     let say = |what: &str| println!("{:7.1} s  {}  {what}", begun.elapsed().as_secs_f64(), memory());
+    let model = RobotModel::load("raven2-nominal").expect("it ships");
     let real = std::env::args().nth(1).expect("a recording");
     let sim = std::env::args().nth(2);
     let given = Given {
         id: "run".to_owned(),
-        real: read(&real),
+        real: read(&real, &model),
         real_sha256: "0".repeat(64),
         notes: Vec::new(),
-        sim: sim.map(|sim| (read(&sim), "0".repeat(64))),
+        sim: sim.map(|sim| (read(&sim, &model), "0".repeat(64))),
     };
     say("read");
     let options = Options {
@@ -49,7 +53,6 @@ fn main() {
         trace: std::env::var_os("TRACE").is_some(),
         urdf_sha256: None,
     };
-    let model = RobotModel::load("raven2-nominal").expect("it ships");
     let outcome = analyse(&model, &[given], &options, &mut |what| say(what)).expect("a report");
     say("done");
     for verdict in &outcome.report.verdicts {
