@@ -48,10 +48,9 @@ impl Window {
     pub fn apply(&self, series: &[f64], derivative: usize) -> Vec<f64> {
         let weights = &self.weights[derivative];
         let (n, half) = (series.len(), self.half);
-        let whole = n.saturating_sub(2 * half);
         let mut out = Vec::with_capacity(n);
         out.extend((0..half.min(n)).map(|i| self.held(weights, series, i)));
-        while out.len() + SIDE_BY_SIDE <= half + whole {
+        while out.len() + SIDE_BY_SIDE <= n.saturating_sub(half) {
             out.extend(side_by_side(weights, &series[out.len() - half..]));
         }
         out.extend((out.len()..n).map(|i| self.held(weights, series, i)));
