@@ -2,6 +2,7 @@
 
 use crate::output;
 use ::gap::analysis::{Given, Options, Outcome, analyse};
+use ::gap::needed::keep_needed;
 use ::gap::search::Thresholds;
 use ::gap::verdicts::sha256;
 use ::gap::watch;
@@ -53,9 +54,13 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let mut given = Vec::new();
     for (k, path) in wish.real.iter().enumerate() {
         let mut notes = Vec::new();
-        let side = model.side();
-        let real = read(path, side, &mut notes)?;
-        let sim = wish.sim.get(k).map(|path| Ok::<_, String>((read(path, side, &mut notes)?, hash(path)?))).transpose()?;
+        let mut read = |path: &Path| {
+            let mut recording = read(path, model.side(), &mut notes)?;
+            keep_needed(&mut recording, &model);
+            Ok::<_, String>(recording)
+        };
+        let real = read(path)?;
+        let sim = wish.sim.get(k).map(|path| Ok::<_, String>((read(path)?, hash(path)?))).transpose()?;
         given.push(Given { id: name(path, k, wish.real), real, real_sha256: hash(path)?, notes, sim });
     }
     let text = model.to_toml();

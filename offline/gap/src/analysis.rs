@@ -14,7 +14,7 @@ use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
 use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
-use crate::run::{Run, RunError, alike, as_noisy, common};
+use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::seldom::Seldom;
 use crate::{builtin, closed_loop, corrected, flexible, known, seldom, verdicts};
@@ -211,11 +211,12 @@ fn analyse_with(
                 // One as noisy as the recording is a recording of its own, whose noise would only be added.
                 let recorded = of_robot(&real, &sim);
                 from_recording |= recorded;
-                if recorded || !alike(&real, &sim) {
+                let alike = alike(&real, &sim);
+                if recorded || !alike {
                     apart.push(sim.clone());
                 }
                 // Of another rate: another run of its own, which says what to believe, and no more.
-                if !alike(&real, &sim) && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
+                if !alike && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
                     (Run { id: one.id.clone(), ..real }, None)
                 } else {
                     let (real, sim) = common(&real, &sim)?;
@@ -251,27 +252,25 @@ fn analyse_with(
         return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
     }
     let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0) };
-    let (train, held) = split(&runs);
+    let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
+    let (train, held) = split(runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
     if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {
         quality.insert(0, too_short(train_s));
-        return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
+        return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     progress("smoothing");
-    let pair = |(real, sim): &(Run, Option<Run>)| Pair {
-        real: Motion::new(real.clone(), band),
-        sim: sim.clone().map(|sim| Motion::new(sim, band)),
-    };
-    let train: Vec<Pair> = train.iter().map(pair).collect();
-    let held: Vec<Pair> = held.iter().map(pair).collect();
+    let pair = |(real, sim): Both| Pair { real: Motion::new(real, band), sim: sim.map(|sim| Motion::new(sim, band)) };
+    let train: Vec<Pair> = train.into_iter().map(pair).collect();
+    let held: Vec<Pair> = held.into_iter().map(pair).collect();
     let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
     if seen_s < 0.5 * SHORTEST_S || train.iter().chain(&held).any(|pair| pair.real.rows.len() < LEAST_ROWS) {
         quality.insert(0, too_few(seen_s));
-        return Ok(verdicts::insufficient(&robot, &runs, given, options, quality, begun));
+        return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     progress("learning what the simulator believes");
-    let mut sims: Vec<Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.clone()).collect();
-    sims.extend(apart.into_iter().map(|sim| Motion::new(sim, band)));
+    let apart: Vec<Motion> = apart.into_iter().map(|sim| Motion::new(sim, band)).collect();
+    let sims: Vec<&Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.as_ref()).chain(&apart).collect();
     let nominal =
         if sims.is_empty() || !at_its_word { Nominal::of(&robot) } else { Nominal::learn_with(&robot, &sims, from_recording) };
     quality.extend(gates::nominal(&robot, &nominal, &sims));
@@ -348,7 +347,7 @@ fn analyse_with(
     quality.extend(again.told.iter().cloned());
     let left_out = corrected.as_ref().map_or(&[][..], |models| &models.left_out);
     quality.extend(left_out.iter().map(|why| DataQuality::new("corrected_model", Level::Warn, format!("not in it: {why}"))));
-    let mut outcome = verdicts::outcome(&found, &runs, given, options, quality, corrected, &again.fits);
+    let mut outcome = verdicts::outcome(&found, &extents, given, options, quality, corrected, &again.fits);
     outcome.report.timing.simulate_s = Some(simulate_s);
     let left: Vec<f64> = (0..problem.cells.len())
         .filter_map(|c| verdicts::held_out(&found, c))
@@ -417,9 +416,8 @@ fn too_few(seconds: f64) -> DataQuality {
 }
 
 /// What is fitted on, and what is held out: the last quarter of the runs, at least one; of a single run its last third.
-#[expect(clippy::type_complexity, reason = "two lists of pairs, used once")]
-fn split(runs: &[(Run, Option<Run>)]) -> (Vec<(Run, Option<Run>)>, Vec<(Run, Option<Run>)>) {
-    if let [(real, sim)] = runs {
+fn split(mut runs: Vec<Both>) -> (Vec<Both>, Vec<Both>) {
+    if let [(real, sim)] = runs.as_slice() {
         let cut = (real.len() as f64 * (1.0 - HELD_OUT)) as usize;
         // A second between them, so that neither window nor memory reaches over.
         let gap = (1.0 / real.dt_s) as usize;
@@ -427,5 +425,6 @@ fn split(runs: &[(Run, Option<Run>)]) -> (Vec<(Run, Option<Run>)>, Vec<(Run, Opt
         return (vec![part(0, cut)], vec![part((cut + gap).min(real.len() - 1), real.len())]);
     }
     let out = (runs.len() / 4).max(1);
-    (runs[..runs.len() - out].to_vec(), runs[runs.len() - out..].to_vec())
+    let held = runs.split_off(runs.len() - out);
+    (runs, held)
 }

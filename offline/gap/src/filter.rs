@@ -4,6 +4,10 @@
 
 /// Samples of the window on each side, in standard deviations.
 const REACH: f64 = 4.0;
+/// Neighbours that are summed side by side: each sum waits for its own last term only.
+const SIDE_BY_SIDE: usize = 16;
+/// The same of rows apart.
+const ROWS: usize = 4;
 
 /// A window of odd length with its derivatives.
 #[derive(Debug, Clone)]
@@ -44,15 +48,19 @@ impl Window {
     pub fn apply(&self, series: &[f64], derivative: usize) -> Vec<f64> {
         let weights = &self.weights[derivative];
         let (n, half) = (series.len(), self.half);
-        let mut out = vec![0.0; n];
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = if i >= half && i + half < n {
-                series[i - half..=i + half].iter().zip(weights).map(|(x, w)| x * w).sum()
-            } else {
-                (0..=2 * half).map(|k| weights[k] * series[(i + k).saturating_sub(half).min(n - 1)]).sum()
-            };
+        let mut out = Vec::with_capacity(n);
+        out.extend((0..half.min(n)).map(|i| self.held(weights, series, i)));
+        while out.len() + SIDE_BY_SIDE <= n.saturating_sub(half) {
+            out.extend(side_by_side(weights, &series[out.len() - half..]));
         }
+        out.extend((out.len()..n).map(|i| self.held(weights, series, i)));
         out
+    }
+
+    /// One sum; beyond the ends the series is held.
+    fn held(&self, weights: &[f64], series: &[f64], i: usize) -> f64 {
+        let last = series.len() - 1;
+        (0..=2 * self.half).map(|k| weights[k] * series[(i + k).saturating_sub(self.half).min(last)]).sum()
     }
 
     /// Autocovariance of white noise of variance 1 behind the window, at lags of `step` samples.
@@ -63,9 +71,47 @@ impl Window {
 
     /// The smoothed value at one sample.
     pub fn at(&self, series: &[f64], i: usize) -> f64 {
-        let n = series.len();
-        (0..=2 * self.half).map(|k| self.weights[0][k] * series[(i + k).saturating_sub(self.half).min(n - 1)]).sum()
+        self.held(&self.weights[0], series, i)
     }
+
+    /// The smoothed values at some samples.
+    pub fn at_all(&self, series: &[f64], samples: &[usize]) -> Vec<f64> {
+        let weights = &self.weights[0];
+        let (half, n) = (self.half, series.len());
+        let mut out = Vec::with_capacity(samples.len());
+        for some in samples.chunks(ROWS) {
+            match <&[usize; ROWS]>::try_from(some) {
+                Ok(rows) if rows.iter().all(|i| *i >= half && i + half < n) => {
+                    out.extend(apart(weights, &rows.map(|i| &series[i - half..=i + half])));
+                }
+                _ => out.extend(some.iter().map(|i| self.held(weights, series, *i))),
+            }
+        }
+        out
+    }
+}
+
+/// Weighted sums of a series from each of its first places on.
+fn side_by_side(weights: &[f64], series: &[f64]) -> [f64; SIDE_BY_SIDE] {
+    let mut sums = [0.0; SIDE_BY_SIDE];
+    for (k, weight) in weights.iter().enumerate() {
+        let Some(values) = series[k..].first_chunk::<SIDE_BY_SIDE>() else { break };
+        sums.iter_mut().zip(values).for_each(|(sum, x)| *sum += weight * x);
+    }
+    sums
+}
+
+/// Weighted sums of several stretches, each as long as the weights.
+fn apart(weights: &[f64], stretches: &[&[f64]; ROWS]) -> [f64; ROWS] {
+    let [a, b, c, d] = *stretches;
+    let mut sums = [0.0; ROWS];
+    for ((((weight, a), b), c), d) in weights.iter().zip(a).zip(b).zip(c).zip(d) {
+        sums[0] += weight * a;
+        sums[1] += weight * b;
+        sums[2] += weight * c;
+        sums[3] += weight * d;
+    }
+    sums
 }
 
 #[cfg(test)]
@@ -89,5 +135,19 @@ mod tests {
         let window = Window::new(0.012, 0.001);
         assert!(window.apply(&[7.0; 300], 0).iter().all(|x| (x - 7.0).abs() < 1e-12));
         assert!(window.apply(&[7.0; 300], 1).iter().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn sums_side_by_side_are_those_one_by_one_to_the_ends() {
+        let window = Window::new(0.012, 0.001);
+        for count in [1, 60, 96, 97, 98, 113, 300] {
+            let series: Vec<f64> = (0..count).map(|i| (f64::from(i) * 0.37).sin() + f64::from(i) * 0.01).collect();
+            let one_by_one: Vec<f64> = (0..series.len()).map(|i| window.at(&series, i)).collect();
+            let rows: Vec<usize> = (0..series.len()).collect();
+            for all in [window.apply(&series, 0), window.at_all(&series, &rows)] {
+                assert_eq!(all.len(), series.len());
+                assert!(all.iter().zip(&one_by_one).all(|(a, b)| (a - b).abs() < 1e-12), "{count}");
+            }
+        }
     }
 }

@@ -7,13 +7,13 @@ use recordings::Recording;
 use crate::motion::Motion;
 use crate::nominal::{Nominal, rms};
 use crate::robot::Robot;
-use crate::run::Run;
+use crate::run::{Both, Run};
 
 /// Speed that counts as motion, of the largest speed.
 const MOVING: f64 = 0.05;
 
 /// Checks the runs; failures first.
-pub(crate) fn check(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
     let mut all = input_sign(robot, runs);
     for (real, sim) in runs {
         all.extend(standing(robot, real));
@@ -43,12 +43,9 @@ fn power(torque: &[f64], velocity: &[f64]) -> f64 {
     work / (rms(torque.iter().copied()) * rms(velocity.iter().copied()) * torque.len() as f64).max(1e-300)
 }
 
-/// A recording and its simulation.
-type Both = (Run, Option<Run>);
-
 /// Sign of torque against velocity: friction takes energy, so over a run every drive gives more than it gets back. A source
 /// whose joints all take energy has its input the other way round.
-fn input_sign(robot: &Robot, runs: &[(Run, Option<Run>)]) -> Vec<DataQuality> {
+fn input_sign(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
     let mut all = Vec::new();
     let n = robot.joint_count();
     let mean_power = |of: &dyn Fn(&Both, usize) -> Option<f64>| -> Option<Vec<f64>> {
@@ -176,7 +173,7 @@ fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
 }
 
 /// How well the tool's own model follows the simulator.
-pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[Motion]) -> Vec<DataQuality> {
+pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[&Motion]) -> Vec<DataQuality> {
     if sims.is_empty() {
         return Vec::new();
     }

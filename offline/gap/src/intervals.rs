@@ -66,7 +66,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
         let theta = &fit.coefficients[start..start + candidate.columns.len()];
         start += theta.len();
         let slopes = slopes(dictionary, candidate, theta);
-        let mut columns = candidate.columns.clone();
+        let mut columns = candidate.columns.to_vec();
         columns.extend(slopes.iter().map(|(_, slope)| slope.clone()));
         grams = scorer.extended(&grams, &columns);
         layout.push((column, theta.to_vec(), slopes.into_iter().map(|(which, _)| which).collect::<Vec<_>>()));
@@ -156,7 +156,7 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
 fn difference(there: &Candidate, here: &Candidate, theta: &[f64], step: f64) -> Column {
     let mut out = Column::default();
     let cells: std::collections::BTreeSet<usize> =
-        there.columns.iter().chain(&here.columns).flat_map(|column| column.parts.iter().map(|(c, _)| *c)).collect();
+        there.columns.iter().chain(here.columns.iter()).flat_map(|column| column.parts.iter().map(|(c, _)| *c)).collect();
     for cell in cells {
         let sum = |candidate: &Candidate| candidate.effect(cell, theta);
         let (a, b) = (sum(there), sum(here));

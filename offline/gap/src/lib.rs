@@ -28,6 +28,7 @@ mod corrected;
 mod experiment;
 mod gates;
 mod known;
+pub mod needed;
 mod pictures;
 mod regime;
 pub mod seldom;

@@ -1,5 +1,7 @@
 //! What the simulator believes: inverse dynamics and deflection, learnt from its own output where it is a black box.
 
+use std::borrow::Borrow;
+
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
@@ -66,12 +68,13 @@ impl Nominal {
     ///
     /// Torque alone does not tell the cable's load where friction is many times larger (a light tool on a stiff drive); the
     /// simulator's own deflection does, so both are fitted together, the compliance first from the robot's own weights.
-    pub fn learn(robot: &Robot, runs: &[Motion]) -> Self {
+    pub fn learn(robot: &Robot, runs: &[impl Borrow<Motion>]) -> Self {
         Self::learn_with(robot, runs, false)
     }
 
     /// The same, of a robot that may have springs and cables which no simulator has.
-    pub fn learn_with(robot: &Robot, runs: &[Motion], springs: bool) -> Self {
+    pub fn learn_with(robot: &Robot, runs: &[impl Borrow<Motion>], springs: bool) -> Self {
+        let runs: &[&Motion] = &runs.iter().map(Borrow::borrow).collect::<Vec<_>>();
         let mut nominal = Self::of(robot);
         for _ in 0..ROUNDS {
             nominal.learn_deflection(robot, runs);
@@ -81,7 +84,7 @@ impl Nominal {
         nominal
     }
 
-    fn learn_torque(&mut self, robot: &Robot, runs: &[Motion], springs: bool) {
+    fn learn_torque(&mut self, robot: &Robot, runs: &[&Motion], springs: bool) {
         let n = robot.joint_count();
         let (links, sprung) = (PARAMETERS * n, (PARAMETERS + DRIVE_COLUMNS) * n);
         let width = sprung + if springs { SPRINGS * n } else { 0 };
@@ -181,7 +184,7 @@ impl Nominal {
         self.torque_error = self.torque_left(robot, runs);
     }
 
-    fn torque_left(&self, robot: &Robot, runs: &[Motion]) -> Vec<f64> {
+    fn torque_left(&self, robot: &Robot, runs: &[&Motion]) -> Vec<f64> {
         let mut evaluator = Evaluator::new(robot, self);
         let n = robot.joint_count();
         let coupling = robot.coupling();
@@ -214,7 +217,7 @@ impl Nominal {
         viscous * run.velocity[j][i] + dry * run.sign(j, i)
     }
 
-    fn learn_deflection(&mut self, robot: &Robot, runs: &[Motion]) {
+    fn learn_deflection(&mut self, robot: &Robot, runs: &[&Motion]) {
         let mut compliance = self.compliance.clone();
         let before = self.clone();
         let mut evaluator = Evaluator::new(robot, &before);

@@ -6,14 +6,13 @@ use crate::analysis::Found;
 use crate::hypothesis::Candidate;
 use crate::nominal::rms;
 use crate::problem::{Channel, Problem};
-use crate::run::Run;
 use crate::verdicts::{cell_name, cell_quantity, cell_unit, held_out, left, main_cell, told};
 
 /// Width of a bin of the heat map, s.
 const BIN_S: f64 = 0.5;
 
 /// Everything that is drawn.
-pub(crate) fn draw(found: &Found, _runs: &[(Run, Option<Run>)]) -> Pictures {
+pub(crate) fn draw(found: &Found) -> Pictures {
     let mut pictures = Pictures { heat: heat(found), shares: shares(found), ..Pictures::default() };
     for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
         let cell = main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients);

@@ -138,7 +138,31 @@ pub struct Run {
     pub left_out: Vec<String>,
 }
 
+/// A recording and the simulation of the same commands, if there is one.
+pub type Both = (Run, Option<Run>);
+
+/// How long a run is: what a report says of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Number of samples.
+    pub samples: usize,
+    /// Sample period, s.
+    pub dt_s: f64,
+}
+
+impl Extent {
+    /// Length, s.
+    pub fn seconds(&self) -> f64 {
+        self.samples as f64 * self.dt_s
+    }
+}
+
 impl Run {
+    /// How long it is.
+    pub fn extent(&self) -> Extent {
+        Extent { samples: self.len(), dt_s: self.dt_s }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.position[0].len()

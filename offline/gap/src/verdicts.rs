@@ -18,7 +18,7 @@ use crate::nominal::{less_means, rms};
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
-use crate::run::Run;
+use crate::run::{Extent, Run};
 use crate::search::{Effect, Scored};
 use crate::seldom::Seldom;
 use crate::{experiment, regime};
@@ -87,7 +87,7 @@ pub(crate) fn main_cell(floors: &[f64], candidate: &Candidate, theta: &[f64]) ->
 /// A report of runs that are too few or too short.
 pub(crate) fn insufficient(
     robot: &Robot,
-    runs: &[(Run, Option<Run>)],
+    runs: &[Extent],
     given: &[Given],
     options: &Options,
     data_quality: Vec<DataQuality>,
@@ -103,7 +103,7 @@ pub(crate) fn insufficient(
 /// The whole report.
 pub(crate) fn outcome(
     found: &Found,
-    runs: &[(Run, Option<Run>)],
+    runs: &[Extent],
     given: &[Given],
     options: &Options,
     data_quality: Vec<DataQuality>,
@@ -170,7 +170,7 @@ pub(crate) fn outcome(
     report.summary = failed.chain(gap_report::headlines(&report)).collect::<Vec<_>>().join(" ");
     Outcome {
         report,
-        pictures: pictures::draw(found, runs),
+        pictures: pictures::draw(found),
         corrected: text,
         left_out: corrected.map_or_else(Vec::new, |models| models.left_out),
         left: f64::NAN,
@@ -178,20 +178,19 @@ pub(crate) fn outcome(
 }
 
 /// Everything but the answer.
-fn bare(robot: &Robot, runs: &[(Run, Option<Run>)], given: &[Given], options: &Options, data_quality: Vec<DataQuality>) -> Report {
-    let seconds = |run: &Run| run.len() as f64 * run.dt_s;
+fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, data_quality: Vec<DataQuality>) -> Report {
     let out = if runs.len() == 1 { 1 } else { (runs.len() / 4).max(1) };
-    let told_runs = runs.iter().zip(given).enumerate().map(|(k, ((real, _), one))| {
-        let rate = 1.0 / real.dt_s;
+    let told_runs = runs.iter().zip(given).enumerate().map(|(k, (extent, one))| {
+        let (seconds, rate) = (extent.seconds(), 1.0 / extent.dt_s);
         let mut run = if runs.len() == 1 {
-            let start = seconds(real) * 2.0 / 3.0 + 1.0;
-            ToldRun::split(&one.id, (start.min(seconds(real)), seconds(real)), seconds(real), rate, one.real_sha256.clone())
+            let start = seconds * 2.0 / 3.0 + 1.0;
+            ToldRun::split(&one.id, (start.min(seconds), seconds), seconds, rate, one.real_sha256.clone())
         } else {
             let role = if k + out >= runs.len() { RunRole::HeldOut } else { RunRole::Train };
-            ToldRun::new(&one.id, role, seconds(real), rate, one.real_sha256.clone())
+            ToldRun::new(&one.id, role, seconds, rate, one.real_sha256.clone())
         };
         run.kind = RunKind::Real;
-        run.samples = Some(real.len() as u64);
+        run.samples = Some(extent.samples as u64);
         run.sim_sha256 = one.sim.as_ref().map(|(_, hash)| hash.clone());
         run
     });

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use arm::serial::{PARAMETERS, Workspace};
+use nalgebra::DMatrix;
 
 use crate::problem::{Channel, Problem};
 
@@ -64,6 +65,8 @@ pub struct Dictionary<'a> {
     pub tip_jacobian: Vec<Vec<f64>>,
     /// Rows of the tip.
     pub tip_rows: Vec<(usize, usize)>,
+    /// Share of a strain of each drive's cable (column) that each joint sees.
+    strain_shares: DMatrix<f64>,
     regressor: OnceLock<Vec<Vec<f64>>>,
 }
 
@@ -89,7 +92,8 @@ impl<'a> Dictionary<'a> {
                 jacobian[..3 * n].to_vec()
             })
             .collect();
-        Self { problem, grid, tip_jacobian, tip_rows, regressor: OnceLock::new() }
+        let strain_shares = problem.robot.coupling().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+        Self { problem, grid, tip_jacobian, tip_rows, strain_shares, regressor: OnceLock::new() }
     }
 
     /// The arm's regressor at every grid row, N×10N row-major.
@@ -123,7 +127,7 @@ impl<'a> Dictionary<'a> {
         let mut out = Vec::with_capacity(self.grid.len());
         for (r, pair) in self.problem.pairs.iter().enumerate() {
             let series = raw(r);
-            out.extend(pair.real.rows.iter().map(|&i| pair.real.window.at(&series, i)));
+            out.extend(pair.real.window.at_all(&series, &pair.real.rows));
         }
         out
     }
@@ -190,8 +194,7 @@ impl<'a> Dictionary<'a> {
     /// A deflection of one drive's cable: joints whose position is read through others' cables see their share.
     pub fn strain_of(&self, drive: usize, series: Vec<f64>) -> Column {
         let n = self.joints();
-        let shares = self.problem.robot.coupling().try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
-        let share = |joint: usize| shares[(joint, drive)];
+        let share = |joint: usize| self.strain_shares[(joint, drive)];
         let of = |joint: usize| (share(joint) != 0.0).then(|| series.iter().map(|x| share(joint) * x).collect());
         let mut all: Vec<Option<Vec<f64>>> = (0..n).map(|joint| if joint == drive { None } else { of(joint) }).collect();
         all[drive] = Some(series);

@@ -161,6 +161,9 @@ impl Family {
     }
 }
 
+/// Edges of windows closer than that are one, s: an effect takes its time to come, and its edge is known no better.
+const SAME_EDGE_S: f64 = 0.3;
+
 /// A family at one shape and window, its columns made.
 #[derive(Debug, Clone)]
 pub struct Candidate {
@@ -170,8 +173,8 @@ pub struct Candidate {
     pub shape: Vec<f64>,
     /// When it is there; none: always.
     pub window: Option<Window>,
-    /// One per coefficient.
-    pub columns: Vec<Column>,
+    /// One per coefficient; shared, since candidates are copied where they are compared.
+    pub columns: Arc<Vec<Column>>,
 }
 
 impl Candidate {
@@ -186,7 +189,7 @@ impl Candidate {
                 *column = column.within(dictionary.problem, window);
             }
         }
-        Self { family: family.clone(), shape: shape.to_vec(), window, columns }
+        Self { family: family.clone(), shape: shape.to_vec(), window, columns: Arc::new(columns) }
     }
 
     /// Numbers of its window that lie in the runs.
@@ -197,7 +200,7 @@ impl Candidate {
     /// The same within a window.
     #[must_use]
     pub fn within(&self, problem: &crate::problem::Problem, window: Window) -> Self {
-        let columns = self.columns.iter().map(|column| column.within(problem, window)).collect();
+        let columns = Arc::new(self.columns.iter().map(|column| column.within(problem, window)).collect());
         Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns }
     }
 
@@ -231,6 +234,17 @@ impl Candidate {
     /// Does every coefficient reach some residual?
     pub fn shows(&self) -> bool {
         !self.columns.is_empty() && self.columns.iter().all(|column| !column.is_empty())
+    }
+
+    /// Does one begin or end where the other does?
+    pub fn shares_edge(&self, other: &Self) -> bool {
+        let edges = |candidate: &Self| candidate.window.into_iter().flatten().filter(|t| t.is_finite()).collect::<Vec<f64>>();
+        edges(self).iter().any(|own| edges(other).iter().any(|its| (own - its).abs() < SAME_EDGE_S))
+    }
+
+    /// Are the two of the same form and shape?
+    pub fn same_start(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.family, &other.family) && self.shape == other.shape
     }
 
     /// Do the two say the same physics at the same place?
