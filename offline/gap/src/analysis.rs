@@ -205,7 +205,10 @@ fn analyse_with(
             // What stands in for it, where it can.
             None => simulated.get(k).and_then(Option::as_ref).and_then(|sim| Run::new(sim, &robot).ok()),
         };
-        let of_robot = |real: &Run, sim: &Run| one.sim.is_some() && as_noisy(real, sim) && !of_a_model(&robot, sim);
+        // One that says what it is, is believed: our own simulator measures as noisily as the robot does.
+        let says_so = one.sim.as_ref().is_some_and(|(sim, _)| sim.metadata.get("simulated").is_some_and(|value| value == "true"));
+        let of_robot =
+            |real: &Run, sim: &Run| one.sim.is_some() && !says_so && as_noisy(real, sim) && !of_a_model(&robot, sim);
         runs.push(match sim {
             Some(sim) => {
                 // One as noisy as the recording is a recording of its own, whose noise would only be added.
