@@ -11,7 +11,8 @@ const INPUTS: usize = 118;
 pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str) -> Result<ExitCode, String> {
     let format: Format = weights.parse().map_err(|error| format!("--weights: {error}"))?;
     let network = model::network(model_path).map_err(|error| error.to_string())?;
-    let choice = choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
+    let choice =
+        choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
     let mut plan = choice.plan;
     if format != Format::F32 {
         let um = |mm: f64| mm * 1000.0;

@@ -207,8 +207,7 @@ fn analyse_with(
         };
         // One that says what it is, is believed: our own simulator measures as noisily as the robot does.
         let says_so = one.sim.as_ref().is_some_and(|(sim, _)| sim.metadata.get("simulated").is_some_and(|value| value == "true"));
-        let of_robot =
-            |real: &Run, sim: &Run| one.sim.is_some() && !says_so && as_noisy(real, sim) && !of_a_model(&robot, sim);
+        let of_robot = |real: &Run, sim: &Run| one.sim.is_some() && !says_so && as_noisy(real, sim) && !of_a_model(&robot, sim);
         runs.push(match sim {
             Some(sim) => {
                 // One as noisy as the recording is a recording of its own, whose noise would only be added.

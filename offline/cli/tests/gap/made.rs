@@ -1,6 +1,6 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
-use crate::common::{Case, Folder, made, named, near, primary, report, wanted, with_effect};
+use crate::common::{Case, Folder, done, made, named, near, primary, report, text, wanted, with_effect};
 use gap_report::{Report, Status};
 use generator::order::Wanted;
 use std::path::Path;
@@ -33,6 +33,19 @@ fn dry_friction_is_named_at_its_joint_and_measured() {
     let report = case.judged(&folder.file("out"));
     let first = named(&report, "coulomb_friction", truth[0].joint_name.as_ref().expect("a joint"));
     near(first, "f_c", truth[0].effect.parameters["f_c"], 0.15);
+}
+
+#[test]
+fn a_simulation_of_our_own_with_the_noise_of_a_robot_is_taken_for_a_simulation() {
+    let folder = Folder::new("own");
+    let loose = folder.write("loose.toml", with_effect("physics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }"));
+    let (real, sim) = (folder.file("real"), folder.file("sim"));
+    done(&["simulate", "--robot", text(&loose), "--minutes", "0.75", "--seed", "3", "--out", text(&real)]);
+    let real = real.join("run_0001.mcap");
+    done(&["simulate", "--robot", "raven2-nominal", "--commands", text(&real), "--out", text(&sim)]);
+    let case = Case { robot: "raven2-nominal".into(), real: vec![real], sim: vec![sim.join("run_0001.mcap")] };
+    let report = case.judged(&folder.file("out"));
+    near(named(&report, "coulomb_friction", "shoulder"), "f_c", 1.0, 0.1);
 }
 
 #[test]
