@@ -318,6 +318,13 @@ fn analyse_with(
     let held_problem = prior.put_on(held_problem);
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
     let held_dictionary = Dictionary::new(&held_problem);
+    // What the controller acts on is what was logged, but where motors or torques are logged late.
+    let late = answer.effects.iter().zip(&estimates).any(|(effect, estimate)| {
+        let family = &effect.chosen.candidate.family;
+        let motors = family.form == "joint encoders" && estimate.coefficients[0] < 0.0;
+        family.physics == "measurement_delay" && (motors || family.form == "torque")
+    });
+    let simulated_by_lab = given.iter().all(|one| one.sim.is_some());
     let found = Found {
         robot: &robot,
         nominal: &nominal,
@@ -330,10 +337,10 @@ fn analyse_with(
         ceiling: &ceiling,
         floors: &floors,
         beside: &beside,
-        controller: given.iter().all(|one| one.sim.is_some()).then(|| crate::controller::changed(&problem)).flatten(),
+        controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,
         // Only against a lab's own simulation, whose floors are known.
-        seldom: (answer.effects.is_empty() && !unmodelled && !from_recording && given.iter().all(|one| one.sim.is_some()))
+        seldom: (answer.effects.is_empty() && !unmodelled && !from_recording && simulated_by_lab)
             .then(|| seldom::left(&problem, &floors))
             .flatten(),
     };

@@ -190,6 +190,9 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
             let link = joint.ok_or("it has no link")?;
             Bound::Link(if form == "length" { link + 1 } else { link })
         }
+        ("measurement_delay", "joint encoders") if estimate.coefficients[0] < 0.0 => {
+            return Err("the simulator has no late motor positions".to_owned());
+        }
         ("measurement_delay", form) => Bound::Channel(match form {
             "joint encoders" => DelayChannel::Transmission,
             "torque" => return Err("the simulator has no late torque".to_owned()),

@@ -115,6 +115,8 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ],
         ("link_geometry", "twist before the joint") => vec![named("d_alpha", "rad", theta[0])],
         ("link_geometry", _) => vec![named("d_length", "m", theta[0])],
+        // Joint encoders that come early against the motors' are motors that come late: nothing is measured ahead of time.
+        ("measurement_delay", "joint encoders") => vec![named("d", "s", theta[0].abs())],
         ("measurement_delay", _) => {
             let mut all = vec![named("d", "s", theta[0])];
             all.extend(theta.get(1).map(|drift| named("clock_drift", "s/s", *drift)));
