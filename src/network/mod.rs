@@ -184,8 +184,7 @@ impl Plan {
             match &layer.weights {
                 Weights::Rows(rows) => rows.run(self.instruction_set, &layer.bias, &self.front, &mut self.back),
                 #[cfg(target_arch = "x86_64")]
-                // SAFETY: tiles are only made where `InstructionSet::available` found VNNI.
-                Weights::Tiles(tiles) => unsafe { tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back) },
+                Weights::Tiles(tiles) => tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back),
             }
             activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.lanes]);
             std::mem::swap(&mut self.front, &mut self.back);

@@ -15,7 +15,7 @@
 use std::arch::x86_64::*;
 
 use super::format::{Format, LARGEST_DIGITS, digits};
-use super::instructions::{LANE, Lane, Line};
+use super::instructions::{InstructionSet, LANE, Lane, Line};
 
 /// Inputs of a tile.
 const DEPTH: usize = 4;
@@ -82,8 +82,9 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Packs `weights`, row by row of `inputs` numbers, as `I8` or `I16`.
+    /// Packs `weights`, row by row of `inputs` numbers, as `I8` or `I16`; only where the machine has VNNI.
     pub(super) fn new(weights: &[f32], inputs: usize, format: Format) -> Self {
+        assert_eq!(InstructionSet::best(), InstructionSet::Avx512Vnni, "tiles are for VNNI");
         let two = format == Format::I16;
         let digits_per_weight = if two { 2 } else { 1 };
         let outputs = weights.len() / inputs.max(1);
@@ -125,11 +126,15 @@ impl Tiles {
     }
 
     /// `output = weights * input + bias`; `digits` is room to work in.
-    ///
+    pub(super) fn run(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
+        // SAFETY: `new` made sure that the machine has VNNI.
+        unsafe { self.run_vnni(bias, input, digits, output) }
+    }
+
     /// # Safety
     /// AVX-512F and VNNI must be present.
     #[target_feature(enable = "avx512f,avx512vnni")]
-    pub(super) unsafe fn run(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
+    unsafe fn run_vnni(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);

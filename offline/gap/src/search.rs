@@ -38,6 +38,14 @@ const ALWAYS: &str = "stribeck_friction";
 const SEEN_OFTEN: f64 = 2.0;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
+/// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
+const TIP_RESOLUTION: f64 = 2e-6;
+
+/// Least RMS of an effect in a channel, in its unit.
+fn resolution(channel: Channel) -> f64 {
+    if channel == Channel::EndEffector { TIP_RESOLUTION } else { 0.0 }
+}
+
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
 
@@ -206,6 +214,8 @@ impl Search<'_, '_> {
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
+        let resolved = |c: usize| own[c] > 0.0 && own[c] >= resolution(self.problem.cells[c].channel);
+        let enough = enough && (0..own.len()).any(resolved);
         Judged { gain, share, amplitude: if enough { amplitude } else { -1.0 } }
     }
 
