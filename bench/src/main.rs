@@ -30,8 +30,8 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let (runs, seconds, write) = match arguments[..] {
         ["ci"] => (4_000, 50, false),
-        ["full"] => (10_000, 100, false),
-        ["full", "--write"] => (10_000, 100, true),
+        ["full"] => (10_000, 60, false),
+        ["full", "--write"] => (10_000, 60, true),
         _ => {
             eprintln!("usage: ravenpose-bench ci|full [--write] (from the repository's top)");
             return ExitCode::from(2);

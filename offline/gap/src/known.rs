@@ -87,7 +87,8 @@ pub(crate) fn model_error(model: &RobotModel, robot: &Robot, given: &[Given], ba
     let of = |channel: Channel, count: usize| -> Vec<f64> {
         let left = |index: usize| {
             pairs.iter().flat_map(move |[sim, own]| {
-                let still = held(sim, index);
+                // An axis of the tip is no drive; an arm of two joints has fewer of these.
+                let still = if channel == Channel::EndEffector { Vec::new() } else { held(sim, index) };
                 let rows = if channel == Channel::EndEffector { &sim.tip_rows } else { &sim.rows };
                 let moving = rows.iter().filter(move |i| channel == Channel::EndEffector || !still[**i]);
                 moving.filter_map(move |&i| Some(value(sim, channel, index, i)? - value(own, channel, index, i)?))

@@ -42,6 +42,11 @@ impl Case {
 /// A case of the generator, written into a folder, with its truth. Labels and seeds are those of these tests alone.
 pub(crate) fn made(folder: &Folder, label: &str, effects: &[Wanted], seconds: f64) -> (Case, Vec<Sealed>) {
     let order = Order { seed: 77, label: format!("cli/{label}"), effects: effects.to_vec(), seconds, runs: 2, ..Order::default() };
+    written(folder, &order)
+}
+
+/// The case of an order, written into a folder, with its truth.
+pub(crate) fn written(folder: &Folder, order: &Order) -> (Case, Vec<Sealed>) {
     let case = order.make().expect("a case");
     let files: BTreeMap<String, PathBuf> =
         case.files.into_iter().map(|(name, bytes)| (name.clone(), folder.write(&name, bytes))).collect();

@@ -1,8 +1,8 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
-use crate::common::{Case, Folder, done, made, named, near, primary, report, text, wanted, with_effect};
+use crate::common::{Case, Folder, done, made, named, near, primary, report, text, wanted, with_effect, written};
 use gap_report::{Report, Status};
-use generator::order::Wanted;
+use generator::order::{Kind, Order, Wanted};
 use std::path::Path;
 
 #[test]
@@ -46,6 +46,32 @@ fn a_simulation_of_our_own_with_the_noise_of_a_robot_is_taken_for_a_simulation()
     let case = Case { robot: "raven2-nominal".into(), real: vec![real], sim: vec![sim.join("run_0001.mcap")] };
     let report = case.judged(&folder.file("out"));
     near(named(&report, "coulomb_friction", "shoulder"), "f_c", 1.0, 0.1);
+}
+
+#[test]
+fn an_arm_of_two_joints_is_judged_like_any_other() {
+    let folder = Folder::new("two");
+    let effects = vec![wanted("viscous_friction", Some(1), &[("b", 2.0)])];
+    let order = |number: usize| Order {
+        seed: 77,
+        label: format!("cli/two {number}"),
+        effects: effects.clone(),
+        robot: Kind::Variant,
+        seconds: 12.0,
+        runs: 2,
+        ..Order::default()
+    };
+    // Arms of two to four joints are drawn.
+    let two = |number: &usize| {
+        let files = order(*number).make().expect("a case").files;
+        files
+            .iter()
+            .any(|(name, bytes)| name == "robot.urdf" && String::from_utf8_lossy(bytes).matches("<transmission").count() == 2)
+    };
+    let (case, truth) = written(&folder, &order((0..20).find(two).expect("an arm of two joints")));
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::Explained, "{}", report.summary);
+    named(&report, "viscous_friction", truth[0].joint_name.as_ref().expect("a joint"));
 }
 
 #[test]
