@@ -166,26 +166,15 @@ fn one_format_gives_the_same_on_every_instruction_set() {
 
 #[test]
 fn odd_widths_are_padded_right_in_every_format_on_every_instruction_set() {
-    use ravenpose_importer::{Activation, Dense, Network};
+    use ravenpose_importer::{Activation, Network};
     let mut rng = common::Rng(9);
     let activations = [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu { alpha: 1.0 }];
     for widths in [[1, 1, 1], [3, 17, 5], [118, 129, 3], [16, 64, 16], [65, 200, 33]] {
         for activation in activations {
-            let mut layer = |inputs: usize, outputs: usize, activation| Dense {
-                inputs,
-                outputs,
-                weights: (0..inputs * outputs).map(|_| rng.uniform() as f32 - 0.5).collect(),
-                bias: (0..outputs).map(|_| rng.uniform() as f32 - 0.5).collect(),
-                activation,
-            };
-            let layers = vec![layer(widths[0], widths[1], activation), layer(widths[1], widths[2], Activation::Identity)];
-            let network = Network {
-                input_width: widths[0],
-                output_width: widths[2],
-                input_scale: None,
-                layers,
-                metadata: std::collections::BTreeMap::new(),
-            };
+            let mut network = Network::dense(&widths, activation, |_, _| rng.uniform() as f32 - 0.5);
+            for bias in network.layers.iter_mut().flat_map(|layer| &mut layer.bias) {
+                *bias = rng.uniform() as f32 - 0.5;
+            }
             let input: Vec<f32> = (0..widths[0]).map(|i| (i as f32 * 0.7).sin()).collect();
             let truth = network.evaluate_f64(&input);
             let size = truth.iter().fold(1.0_f64, |size, y| size.max(y.abs()));

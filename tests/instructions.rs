@@ -8,7 +8,7 @@ mod world;
 
 use ravenpose::cycle::Limits;
 use ravenpose::network::{Format, InstructionSet, Plan};
-use ravenpose_importer::{Activation, Dense, Network};
+use ravenpose_importer::{Activation, Network};
 use ravenpose_wire::{CorrectedPose, RavenState};
 use std::process::Command;
 use world::MS;
@@ -37,16 +37,8 @@ fn part(name: &str, runs: usize) {
         std::hint::black_box(&pose);
     } else {
         // Reading a model from its file would take valgrind a minute.
-        let layers = [118, 600, 500, 400, 3].windows(2).map(|ends| Dense {
-            inputs: ends[0],
-            outputs: ends[1],
-            weights: (0..ends[0] * ends[1]).map(|i| ((i * 7919) % 2003) as f32 * 1e-4 - 0.1).collect(),
-            bias: vec![0.1; ends[1]],
-            activation: if ends[1] == 3 { Activation::Identity } else { Activation::Sigmoid },
-        });
-        let layers = layers.collect();
-        let network =
-            Network { input_width: 118, output_width: 3, input_scale: None, layers, metadata: std::collections::BTreeMap::new() };
+        let weight = |place: usize, _| ((place * 7919) % 2003) as f32 * 1e-4 - 0.1;
+        let network = Network::dense(&[118, 600, 500, 400, 3], Activation::Sigmoid, weight);
         let mut plan = Plan::with(&network, InstructionSet::Avx2, Format::I16);
         let mut output = [0.0_f32; 3];
         for run in 0..runs {

@@ -2,7 +2,7 @@
 
 use crate::table::{Table, quantiles};
 use ravenpose::network::{Format, InstructionSet, Plan};
-use ravenpose_importer::{Activation, Dense, Network};
+use ravenpose_importer::{Activation, Network, Random};
 use ravenpose_transport::now_ns;
 
 /// Widths of the three hidden layers.
@@ -13,24 +13,10 @@ const ROUNDS: usize = 3;
 
 /// 118 inputs, three hidden layers of this width, 3 outputs, random weights.
 fn network(width: usize) -> Network {
-    let mut state = 1_u64;
-    let mut number = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / 16_777_216.0 - 0.5
-    };
-    let widths = [118, width, width, width, 3];
-    let layers = widths.windows(2).map(|ends| {
-        let spread = (6.0 / ends[0] as f32).sqrt();
-        Dense {
-            inputs: ends[0],
-            outputs: ends[1],
-            weights: (0..ends[0] * ends[1]).map(|_| number() * spread).collect(),
-            bias: vec![0.0; ends[1]],
-            activation: if ends[1] == 3 { Activation::Identity } else { Activation::Sigmoid },
-        }
-    });
-    let layers = layers.collect();
-    Network { input_width: 118, output_width: 3, input_scale: None, layers, metadata: std::collections::BTreeMap::new() }
+    let mut random = Random::new(1);
+    Network::dense(&[118, width, width, width, 3], Activation::Sigmoid, |_, inputs| {
+        (random.uniform() as f32 - 0.5) * (6.0 / inputs as f32).sqrt()
+    })
 }
 
 /// Median time of one turn of all plans, µs: the smallest of some rounds.

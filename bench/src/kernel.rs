@@ -129,8 +129,9 @@ impl Contender {
     }
 }
 
-/// Times every engine in turn, round by round, so that drift of the machine meets all alike.
-pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Vec<Table>, String> {
+/// Times every engine in turn, round by round, so that drift of the machine meets all alike; in the tight loop, and unless that is all
+/// that is wanted between sleeps and with flushed weights.
+pub(crate) fn run(bytes: &[u8], runs: usize, tight_only: bool) -> Result<Vec<Table>, String> {
     let expected = Expected { inputs: 118, outputs: 3 };
     let network = ravenpose_importer::import(bytes, &expected).map_err(|error| error.to_string())?;
     let mut contenders = contenders(bytes, &network, &expected)?;
@@ -144,7 +145,7 @@ pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Vec<Table>, String> {
         }
     }
     tables.push(table("Network 118-600-500-400-3, one thread, tight loop, us", &mut contenders));
-    if std::env::var("RAVENPOSE_BENCH_ONLY").as_deref() == Ok("tight") {
+    if tight_only {
         return Ok(tables);
     }
 
@@ -175,26 +176,19 @@ pub(crate) fn run(bytes: &[u8], runs: usize) -> Result<Vec<Table>, String> {
 fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Vec<Contender>, String> {
     let usual = inputs(network);
     let mut all = Vec::new();
-    for format in [Format::F32, Format::F16, Format::I16, Format::I8] {
-        let plan = Plan::with(network, InstructionSet::best(), format);
+    let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
+    // What is stored in as many bytes has one floor.
+    for formats in [&[Format::F32][..], &[Format::F16, Format::I16], &[Format::I8]] {
         let floor = all.len();
-        if format != Format::I16 {
-            let same = Box::new(Plan::with(network, InstructionSet::best(), format));
-            all.push(Contender::new(
-                format!("floor: read {:.2} MB once", plan.bytes() as f64 / 1e6),
-                Engine::Floor(same),
-                floor,
-                &usual,
-            ));
-        }
-        let floor = if format == Format::I16 { floor - 3 } else { floor };
-        let narrow = Plan::with(network, InstructionSet::Avx2, format);
-        let portable = Plan::with(network, InstructionSet::Portable, format);
-        let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
-        all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
-        all.push(Contender::new(name(&narrow), Engine::Plan(Box::new(narrow)), floor, &usual));
-        if format == Format::I16 {
-            all.push(Contender::new(name(&portable), Engine::Plan(Box::new(portable)), floor, &usual));
+        let read = Plan::with(network, InstructionSet::best(), formats[0]);
+        let title = format!("floor: read {:.2} MB once", read.bytes() as f64 / 1e6);
+        all.push(Contender::new(title, Engine::Floor(Box::new(read)), floor, &usual));
+        for &format in formats {
+            let sets = [InstructionSet::best(), InstructionSet::Avx2, InstructionSet::Portable];
+            for set in &sets[..if format == Format::I16 { 3 } else { 2 }] {
+                let plan = Plan::with(network, *set, format);
+                all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
+            }
         }
     }
     match onnxruntime::library() {

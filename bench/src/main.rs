@@ -60,7 +60,7 @@ fn measure(runs: usize, seconds: u64, write: bool) -> Result<(), String> {
         scope
             .spawn(|| {
                 let _ = realtime::pin(service_core);
-                let mut tables = kernel::run(&bytes, runs)?;
+                let mut tables = kernel::run(&bytes, runs, only.as_deref() == Some("tight"))?;
                 if only.is_none() {
                     tables.extend(growth::run());
                 }

@@ -8,6 +8,7 @@ use crate::error::ImportError;
 use crate::fold::Folded;
 use crate::network::{Activation, Dense, scaled_f64};
 use crate::oracle::Oracle;
+use crate::random::Random;
 
 /// Half the distance between 1 and the next float32.
 const ROUNDING: f64 = 1.0 / 16_777_216.0;
@@ -18,7 +19,7 @@ const MARGIN: f64 = 8.0;
 const SPREADS: [f64; 8] = [0.0, 0.01, 0.1, 0.5, 1.0, 1.0, 1.0, 3.0];
 
 pub(crate) fn check(folded: &Folded, oracle: &mut Oracle) -> Result<(), ImportError> {
-    let mut random = Random(0x5EED);
+    let mut random = Random::new(0x5EED);
     for spread in SPREADS {
         let input = test_input(folded, spread, &mut random);
         let tract = oracle.run(&input)?;
@@ -50,12 +51,7 @@ fn compare(imported: &[Value], tract: &[f32]) -> Result<(), ImportError> {
 
 /// A raw input that the network's own scaling turns into numbers of about `spread`.
 fn test_input(folded: &Folded, spread: f64, random: &mut Random) -> Vec<f32> {
-    let plain = |random: &mut Random| random.normal() * spread;
-    let raw = |index: usize, z: f64| match &folded.network.input_scale {
-        Some(s) if s.scale[index] != 0.0 => f64::from(s.shift[index]) + z / f64::from(s.scale[index]),
-        _ => z,
-    };
-    let inputs = (0..folded.network.input_width).map(|index| raw(index, plain(random)) as f32);
+    let inputs = (0..folded.network.input_width).map(|index| folded.network.raw_input(index, normal(random) * spread));
     inputs.map(|x| if x.is_finite() { x } else { 0.0 }).collect()
 }
 
@@ -110,22 +106,9 @@ fn steepness(activation: Activation) -> f64 {
     }
 }
 
-/// SplitMix64: the same test inputs for every import.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    }
-
-    /// Nearly normal with deviation 1: a sum of twelve uniform numbers.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
+/// Nearly normal with deviation 1: a sum of twelve uniform numbers.
+fn normal(random: &mut Random) -> f64 {
+    (0..12).map(|_| random.uniform()).sum::<f64>() - 6.0
 }
 
 #[cfg(test)]

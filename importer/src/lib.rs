@@ -21,6 +21,7 @@ mod guard;
 mod limits;
 mod network;
 mod oracle;
+mod random;
 mod text;
 mod tract;
 mod wire;
@@ -32,6 +33,7 @@ mod common;
 pub use error::ImportError;
 pub use network::{Activation, Dense, InputScale, Network};
 pub use oracle::Oracle;
+pub use random::Random;
 
 /// The shape that the service's contract asks for: float32 `[1, inputs]` to `[1, outputs]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -115,6 +115,40 @@ impl Network {
         trace
     }
 
+    /// The raw input that the network's own scaling turns into `z`; `z` itself where it has none.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such input.
+    pub fn raw_input(&self, index: usize, z: f64) -> f32 {
+        let raw = match &self.input_scale {
+            Some(step) if step.scale[index] != 0.0 => f64::from(step.shift[index]) + z / f64::from(step.scale[index]),
+            _ => z,
+        };
+        raw as f32
+    }
+
+    /// A chain of dense layers of these widths, inputs first, with zero biases, `hidden` activations and a linear last layer. `weight`
+    /// gives the weight at a place of a layer, row by row, for the number of the layer's inputs. For benchmarks and tests.
+    pub fn dense(widths: &[usize], hidden: Activation, mut weight: impl FnMut(usize, usize) -> f32) -> Self {
+        let last = widths.len().saturating_sub(2);
+        let layer = |(number, ends): (usize, &[usize])| Dense {
+            inputs: ends[0],
+            outputs: ends[1],
+            weights: (0..ends[0] * ends[1]).map(|place| weight(place, ends[0])).collect(),
+            bias: vec![0.0; ends[1]],
+            activation: if number == last { Activation::Identity } else { hidden },
+        };
+        let layers = widths.windows(2).enumerate().map(layer).collect();
+        Self {
+            input_width: widths.first().copied().unwrap_or(0),
+            output_width: widths.last().copied().unwrap_or(0),
+            input_scale: None,
+            layers,
+            metadata: BTreeMap::new(),
+        }
+    }
+
     /// Numbers that a kernel has to read: weights, biases and input scaling.
     pub fn parameter_count(&self) -> usize {
         let layers: usize = self.layers.iter().map(|l| l.weights.len() + l.bias.len()).sum();

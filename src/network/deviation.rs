@@ -1,7 +1,7 @@
 //! Which weight format is exact enough for a network: measured against float64 when it is loaded, never in the loop.
 
 use super::{Format, InstructionSet, Plan};
-use ravenpose_importer::Network;
+use ravenpose_importer::{Network, Random};
 use std::fmt;
 use thiserror::Error;
 
@@ -55,9 +55,9 @@ impl fmt::Display for Format {
 /// # Errors
 /// [`NotExactEnough`] if the format asked for deviates by more. Float32 is always allowed: it is the network as it came.
 pub fn choose(network: &Network, golden: &[&[f32]], limit: f64, asked: Option<Format>) -> Result<Choice, NotExactEnough> {
-    let mut random = Random(0x0005_EED0_F0DD);
+    let mut random = Random::new(0x0005_EED0_F0DD);
     let mut inputs: Vec<Vec<f32>> = golden.iter().map(|input| input.to_vec()).collect();
-    inputs.extend((0..RANDOM_INPUTS).map(|_| random.input(network)));
+    inputs.extend((0..RANDOM_INPUTS).map(|_| random_input(network, &mut random)));
     let truths: Vec<Vec<f64>> = inputs.iter().map(|input| network.evaluate_f64(input)).collect();
     let candidates = asked.as_ref().map_or(&CANDIDATES[..], std::slice::from_ref);
     let mut last = None;
@@ -75,10 +75,10 @@ pub fn choose(network: &Network, golden: &[&[f32]], limit: f64, asked: Option<Fo
 
 /// The mean of what goes into each layer, over as many random inputs.
 pub(super) fn mean_inputs(network: &Network, count: usize) -> Vec<Vec<f64>> {
-    let mut random = Random(0x00CA_11B0);
+    let mut random = Random::new(0x00CA_11B0);
     let mut means: Vec<Vec<f64>> = network.layers.iter().map(|layer| vec![0.0; layer.inputs]).collect();
     for _ in 0..count {
-        for (mean, x) in means.iter_mut().zip(network.trace_f64(&random.input(network))) {
+        for (mean, x) in means.iter_mut().zip(network.trace_f64(&random_input(network, &mut random))) {
             for (mean, x) in mean.iter_mut().zip(x) {
                 *mean += x / count as f64;
             }
@@ -103,30 +103,11 @@ fn measure(plan: &mut Plan, inputs: &[Vec<f32>], truths: &[Vec<f64>]) -> Deviati
     Deviation { worst, rms: (squares / count.max(1) as f64).sqrt(), inputs: inputs.len() }
 }
 
-/// SplitMix64: the same inputs at every start.
-struct Random(u64);
+/// Normal, by Box and Muller.
+fn normal(random: &mut Random) -> f64 {
+    (-2.0 * random.uniform().max(1e-300).ln()).sqrt() * (std::f64::consts::TAU * random.uniform()).cos()
+}
 
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    }
-
-    /// Normal, by Box and Muller.
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().max(1e-300).ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    /// A raw input that the network's own scaling turns into normal numbers.
-    fn input(&mut self, network: &Network) -> Vec<f32> {
-        let raw = |index: usize, z: f64| match &network.input_scale {
-            Some(step) if step.scale[index] != 0.0 => f64::from(step.shift[index]) + z / f64::from(step.scale[index]),
-            Some(step) => f64::from(step.shift[index]),
-            None => z,
-        };
-        (0..network.input_width).map(|index| raw(index, self.normal()) as f32).collect()
-    }
+fn random_input(network: &Network, random: &mut Random) -> Vec<f32> {
+    (0..network.input_width).map(|index| network.raw_input(index, normal(random))).collect()
 }

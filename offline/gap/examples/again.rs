@@ -1,7 +1,6 @@
 //! Feeds what was found back: the corrected model on a run that was not fitted, and the same with its main number 30 % off.
 //! For development: `again FOLDER [PART OF A NAME]`, a folder of the generator.
 use gap::analysis::{Given, Options, Outcome, analyse};
-use gap::search::Thresholds;
 use gap_report::{Report, Role};
 use simulator::model::RobotModel;
 use simulator::physics::{Physics, Value};
@@ -19,13 +18,7 @@ fn gap(model: &RobotModel, runs: &[(&Path, Option<&Path>)]) -> Outcome {
             sim: sim.map(|sim| (read(sim), "0".repeat(64))),
         })
         .collect();
-    let options = Options {
-        thresholds: Thresholds::default(),
-        seed: 0,
-        config_sha256: "0".repeat(64),
-        trace: std::env::var_os("TRACE").is_some(),
-        urdf_sha256: None,
-    };
+    let options = Options { trace: std::env::var_os("TRACE").is_some(), ..Options::default() };
     analyse(model, &given, &options, &mut |_| {}).expect("a report")
 }
 

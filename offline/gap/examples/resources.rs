@@ -1,7 +1,6 @@
 //! Seconds and memory of each stage of an analysis: `resources REAL [SIM]`, recordings of the built-in arm. For development.
 use gap::analysis::{Given, Options, analyse};
 use gap::needed::keep_needed;
-use gap::search::Thresholds;
 use recordings::open::{Opened, open};
 use recordings::tidy::{self, StateTable};
 use recordings::{Recording, table};
@@ -46,13 +45,7 @@ fn main() {
         sim: sim.map(|sim| (read(&sim, &model), "0".repeat(64))),
     };
     say("read");
-    let options = Options {
-        thresholds: Thresholds::default(),
-        seed: 0,
-        config_sha256: "0".repeat(64),
-        trace: std::env::var_os("TRACE").is_some(),
-        urdf_sha256: None,
-    };
+    let options = Options { trace: std::env::var_os("TRACE").is_some(), ..Options::default() };
     let outcome = analyse(&model, &[given], &options, &mut |what| say(what)).expect("a report");
     say("done");
     for verdict in &outcome.report.verdicts {

@@ -49,6 +49,13 @@ pub struct Options {
     pub urdf_sha256: Option<String>,
 }
 
+impl Default for Options {
+    /// The usual limits, and a hash of nothing.
+    fn default() -> Self {
+        Self { thresholds: Thresholds::default(), seed: 0, config_sha256: "0".repeat(64), trace: false, urdf_sha256: None }
+    }
+}
+
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalysisError {
