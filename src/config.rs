@@ -69,6 +69,8 @@ pub struct Config {
     pub wait: Wait,
     /// Polling before a state is due, ns (`wait = "sleep"`).
     pub spin_ns: i64,
+    /// Read the weights while polling, so that they are in the caches when a state comes.
+    pub keep_warm: bool,
     /// Keep the processor out of deep idle states.
     pub hold_cpu_dma_latency: bool,
     /// Lock all memory.
@@ -152,7 +154,8 @@ impl Config {
             core: looping.integer("core", 0..=4095)?.map(|core| core as usize),
             priority: looping.integer("priority", 1..=95)?.unwrap_or(80) as i32,
             wait: looping.wait("wait")?.unwrap_or(Wait::Sleep),
-            spin_ns: looping.integer("spin_us", 0..=900)?.unwrap_or(200) * 1000,
+            spin_ns: looping.integer("spin_us", 0..=900)?.unwrap_or(400) * 1000,
+            keep_warm: looping.boolean("keep_warm", true)?,
             hold_cpu_dma_latency: looping.boolean("hold_cpu_dma_latency", false)?,
             lock_memory: looping.boolean("lock_memory", true)?,
             limits,

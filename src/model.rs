@@ -119,6 +119,10 @@ impl Estimator for Plan {
     fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
         Plan::run(self, features, error_mm);
     }
+
+    fn keep_warm(&mut self) {
+        Plan::keep_warm(self);
+    }
 }
 
 /// Reads a model file of bounded size.

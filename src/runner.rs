@@ -36,6 +36,8 @@ pub struct Waiting {
     pub wait: Wait,
     /// Polling before a state is due, ns.
     pub spin_ns: i64,
+    /// Keep the models warm while polling.
+    pub keep_warm: bool,
 }
 
 /// Why the loop ended.
@@ -284,7 +286,11 @@ impl<E: Estimator> Runner<E> {
     fn poll_until(&mut self, deadline_ns: i64) {
         // Bounded by the deadline, which is at most one period away.
         while !self.waiting_state() && now_ns() < deadline_ns {
-            std::hint::spin_loop();
+            if self.waiting.keep_warm {
+                self.cycle.keep_warm();
+            } else {
+                std::hint::spin_loop();
+            }
         }
     }
 

@@ -254,7 +254,7 @@ fn spawn_loop(
             let _ = config.core.map(realtime::pin);
             let _ = realtime::set_fifo(config.priority);
             let shared = ends.2.clone();
-            let waiting = Waiting { wait: config.wait, spin_ns: config.spin_ns };
+            let waiting = Waiting { wait: config.wait, spin_ns: config.spin_ns, keep_warm: config.keep_warm };
             let mut runner = match Runner::open(&config.transport, cycle, config.limits, waiting, ends) {
                 Ok(runner) => runner,
                 Err(error) => {

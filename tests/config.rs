@@ -11,7 +11,7 @@ use std::process::{Command, Output};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_ravenposed");
 const TOP: &str = "allow_untrained, allow_degraded, transport, loop, limits, gold, green, report";
-const LOOP: &str = "core, priority, wait, spin_us, hold_cpu_dma_latency, lock_memory";
+const LOOP: &str = "core, priority, wait, spin_us, keep_warm, hold_cpu_dma_latency, lock_memory";
 const LIMITS: &str = "period_us, stale_us, budget_us, good_cycles, recover_um_per_cycle, rate_um_per_cycle, envelope_mm, late_degraded, late_fallback";
 const SYNTAX: &str = "write key = value, text in double quotes, tables as [name]";
 const VALUE: &str = "the value is missing, followed by something else, or text without quotes";
@@ -191,6 +191,7 @@ core = 3
 priority = 70
 wait = "event"
 spin_us = 150
+keep_warm = false
 hold_cpu_dma_latency = true
 lock_memory = false
 [limits]
@@ -377,7 +378,10 @@ fn every_key_is_read() {
     let config = Config::read(&directory.file("full.toml", FULL)).expect("a good configuration");
     assert!(config.allow_untrained && config.allow_degraded);
     assert_eq!((config.transport.prefix.as_str(), config.transport.root.as_str()), ("robot-2_", "/tmp/robot2/"));
-    assert_eq!((config.core, config.priority, config.wait, config.spin_ns), (Some(3), 70, Wait::Event, 150_000));
+    assert_eq!(
+        (config.core, config.priority, config.wait, config.spin_ns, config.keep_warm),
+        (Some(3), 70, Wait::Event, 150_000, false)
+    );
     assert!(config.hold_cpu_dma_latency && !config.lock_memory);
     let limits = config.limits;
     assert_eq!((limits.period_ns, limits.stale_ns, limits.budget_ns), (2_000_000, 6_000_000, 300_000));
@@ -396,7 +400,10 @@ fn every_key_is_read() {
 fn absent_keys_have_their_defaults() {
     let config = Config::parse("empty", "", Path::new("/etc/ravenpose")).expect("an empty configuration");
     assert!(!config.allow_untrained && !config.allow_degraded && !config.hold_cpu_dma_latency && config.lock_memory);
-    assert_eq!((config.core, config.priority, config.wait, config.spin_ns), (None, 80, Wait::Sleep, 200_000));
+    assert_eq!(
+        (config.core, config.priority, config.wait, config.spin_ns, config.keep_warm),
+        (None, 80, Wait::Sleep, 400_000, true)
+    );
     assert_eq!(config.limits.period_ns, 1_000_000);
     assert_eq!(config.models, [None, None]);
     assert_eq!((config.runtime_dir, config.histogram_dir), (PathBuf::from("/run/ravenpose"), None));

@@ -63,6 +63,22 @@ fn every_reference_model_gives_its_golden_outputs_on_every_instruction_set() {
 }
 
 #[test]
+fn keeping_weights_warm_changes_no_output() {
+    let network = model::network(&common::untrained()).expect("the repository's model");
+    for mut plan in every_plan(&network) {
+        let mut expected = [0.0_f32; 3];
+        plan.run(&[0.25; 118], &mut expected);
+        // More than once round: 8 KiB each time.
+        for _ in 0..plan.bytes() / 4096 + 8 {
+            plan.keep_warm();
+        }
+        let mut found = [0.0_f32; 3];
+        plan.run(&[0.25; 118], &mut found);
+        assert_eq!(found.map(f32::to_bits), expected.map(f32::to_bits), "{}", name(&plan));
+    }
+}
+
+#[test]
 fn nan_and_infinity_in_an_input_reach_the_output_of_every_kernel() {
     let network = model::network(&common::untrained()).expect("the repository's model");
     for mut plan in every_plan(&network) {

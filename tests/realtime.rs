@@ -40,7 +40,7 @@ fn runner(settings: &Settings, wait: Wait) -> (Runner<Plan>, histogram::Collecto
     let (recorder, collector) = histogram::exchange();
     let (sender, events) = shared::events();
     let shown = Arc::new(Shared::default());
-    let waiting = Waiting { wait, spin_ns: 200_000 };
+    let waiting = Waiting { wait, spin_ns: 400_000, keep_warm: true };
     let runner = Runner::open(settings, cycle, limits, waiting, (recorder, sender, shown.clone())).expect("link");
     (runner, collector, events, shown)
 }

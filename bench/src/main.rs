@@ -25,19 +25,49 @@ const BASELINE: &str = "this machine: wake-up of a FIFO thread, 10 s";
 /// The kernel has to stay faster than tract's runner in the same process by at least this much; it takes about half the time.
 const RATIO_TO_TRACT_MAX: f64 = 0.9;
 
+/// What is measured.
+struct Parts {
+    kernel: bool,
+    /// Of the kernel only the tight loop.
+    tight_only: bool,
+    growth: bool,
+    means: bool,
+    waits: Vec<&'static str>,
+}
+
+impl Parts {
+    /// All of `ci` or `full`, or what `RAVENPOSE_BENCH_ONLY` names: `tight` or `kernel` for the network alone; `sleep`, `spin` or
+    /// `event` for one way of waiting; `means` for what makes the default one fast.
+    fn wanted(full: bool, only: Option<&str>) -> Result<Self, String> {
+        const WAITS: [&str; 3] = ["sleep", "spin", "event"];
+        let nothing = Self { kernel: false, tight_only: false, growth: false, means: false, waits: Vec::new() };
+        Ok(match only {
+            None => Self { kernel: true, growth: true, means: full, waits: WAITS.to_vec(), ..nothing },
+            Some("tight") => Self { kernel: true, tight_only: true, ..nothing },
+            Some("kernel") => Self { kernel: true, ..nothing },
+            Some("means") => Self { means: true, ..nothing },
+            Some(other) => match WAITS.into_iter().find(|wait| *wait == other) {
+                Some(wait) => Self { waits: vec![wait], ..nothing },
+                None => return Err(format!("RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, means, sleep, spin or event")),
+            },
+        })
+    }
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let (runs, seconds, write) = match arguments[..] {
-        ["ci"] => (4_000, 50, false),
-        ["full"] => (10_000, 60, false),
-        ["full", "--write"] => (10_000, 60, true),
+    let (full, write) = match arguments[..] {
+        ["ci"] => (false, false),
+        ["full"] => (true, false),
+        ["full", "--write"] => (true, true),
         _ => {
             eprintln!("usage: ravenpose-bench ci|full [--write] (from the repository's top)");
             return ExitCode::from(2);
         }
     };
-    match measure(runs, seconds, write) {
+    let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
+    match Parts::wanted(full, only.as_deref()).and_then(|parts| measure(&parts, full, write)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("ravenpose-bench: {message}");
@@ -46,22 +76,54 @@ fn main() -> ExitCode {
     }
 }
 
-fn measure(runs: usize, seconds: u64, write: bool) -> Result<(), String> {
-    let model = "models/untrained.onnx";
-    let bytes = std::fs::read(model).map_err(|cause| format!("{model}: {cause}; run from the repository's top"))?;
+fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
+    let (runs, seconds) = if full { (10_000, 60) } else { (4_000, 50) };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let service_core = cores - 1;
-    // RAVENPOSE_BENCH_ONLY=tight or =kernel measures the network alone, =sleep, =spin or =event one way of waiting.
-    let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
     println!("{}; robot on core {ROBOT_CORE}, service on core {service_core}; every figure in us\n", page::machine());
+    let mut tables = Vec::new();
+    if parts.kernel {
+        tables = network(parts, service_core, runs)?;
+    }
+    if parts.means || !parts.waits.is_empty() {
+        for missing in [realtime::lock_memory(), realtime::pin(ROBOT_CORE), realtime::set_fifo(ROBOT_PRIORITY)]
+            .into_iter()
+            .filter_map(Result::err)
+        {
+            println!("note: {missing}");
+        }
+    }
+    if parts.means {
+        let table = path::means(service_core, 4, seconds / 4)?;
+        println!("{table}");
+        tables.push(table);
+    }
+    if !parts.waits.is_empty() {
+        let table = through_shared_memory(&parts.waits, service_core, seconds)?;
+        println!("{table}");
+        let found = |name: &str| table.find(name).map_or(f64::NAN, |row| row[2]);
+        let (reached, machine) = (found("    input_to_output"), found(BASELINE));
+        println!(
+            "input to output, {}: p99.9 {reached:.1} us (wanted below {INPUT_TO_OUTPUT_US} us on a quiet machine), {:.1} x the machine's own wake-up p99.9",
+            parts.waits[0],
+            reached / machine
+        );
+        tables.push(table);
+    }
+    if write { page::write(&tables, &page::machine()) } else { Ok(()) }
+}
 
+/// The network beside its peers, and its growth; an error if it is not fast enough beside tract.
+fn network(parts: &Parts, core: usize, runs: usize) -> Result<Vec<Table>, String> {
+    let model = "models/untrained.onnx";
+    let bytes = std::fs::read(model).map_err(|cause| format!("{model}: {cause}; run from the repository's top"))?;
     // Without FIFO here: a thread that computes without a pause would meet real-time throttling.
-    let mut tables = std::thread::scope(|scope| {
+    let tables = std::thread::scope(|scope| {
         scope
             .spawn(|| {
-                let _ = realtime::pin(service_core);
-                let mut tables = kernel::run(&bytes, runs, only.as_deref() == Some("tight"))?;
-                if only.is_none() {
+                let _ = realtime::pin(core);
+                let mut tables = kernel::run(&bytes, runs, parts.tight_only)?;
+                if parts.growth {
                     tables.extend(growth::run());
                 }
                 Ok::<_, String>(tables)
@@ -76,36 +138,18 @@ fn measure(runs: usize, seconds: u64, write: bool) -> Result<(), String> {
     if gate > RATIO_TO_TRACT_MAX {
         return Err(format!("float32 takes {gate:.2} times tract's time in the same process, more than {RATIO_TO_TRACT_MAX}"));
     }
-    if only.as_deref().is_some_and(|only| ["tight", "kernel"].contains(&only)) {
-        return Ok(());
-    }
-
-    let table = through_shared_memory(service_core, seconds, only.as_deref())?;
-    println!("{table}");
-    let found = |name: &str| table.find(name).map_or(f64::NAN, |row| row[2]);
-    let (reached, machine) = (found("    input_to_output"), found(BASELINE));
-    println!(
-        "input to output in the default mode: p99.9 {reached:.1} us (wanted below {INPUT_TO_OUTPUT_US} us on a quiet machine), {:.1} x the machine's own wake-up p99.9",
-        reached / machine
-    );
-    tables.push(table);
-    if write { page::write(&tables, &page::machine()) } else { Ok(()) }
+    Ok(tables)
 }
 
 /// A wake-up baseline of the same minute, then each way of waiting.
-fn through_shared_memory(service_core: usize, seconds: u64, only: Option<&str>) -> Result<Table, String> {
-    for missing in
-        [realtime::lock_memory(), realtime::pin(ROBOT_CORE), realtime::set_fifo(ROBOT_PRIORITY)].into_iter().filter_map(Result::err)
-    {
-        println!("note: {missing}");
-    }
+fn through_shared_memory(waits: &[&str], service_core: usize, seconds: u64) -> Result<Table, String> {
     let mut table =
         Table::new(&format!("1 kHz for {seconds} s through shared memory, one arm"), &["p50", "p99", "p99.9", "max", "missed"]);
     let wakeup =
         check::measure_wakeup(Duration::from_secs(10), Some(service_core), SERVICE_PRIORITY).map_err(|error| error.to_string())?;
     let us = |ns: u64| ns as f64 / 1000.0;
     table.row(BASELINE, &[us(wakeup.p50_ns), us(wakeup.p99_ns), us(wakeup.p999_ns), us(wakeup.max_ns), f64::NAN]);
-    for wait in ["sleep", "spin", "event"].into_iter().filter(|wait| only.is_none_or(|only| only == *wait)) {
+    for wait in waits {
         path::run(&mut table, wait, service_core, seconds)?;
     }
     Ok(table)

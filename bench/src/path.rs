@@ -24,15 +24,14 @@ struct World {
 }
 
 impl World {
-    fn start(wait: &str, core: usize) -> Result<Self, String> {
-        let dir = std::env::temp_dir().join(format!("ravenpose-bench-{wait}-{}", std::process::id()));
+    fn start(waiting: &str, core: usize) -> Result<Self, String> {
+        let dir = std::env::temp_dir().join(format!("ravenpose-bench-{}", std::process::id()));
         std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
-        let settings =
-            Settings { prefix: format!("rpbench{wait}{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
+        let settings = Settings { prefix: format!("rpbench{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
         let model = std::fs::canonicalize("models/untrained.onnx").map_err(|cause| format!("models/untrained.onnx: {cause}"))?;
         let config = dir.join("c.toml");
         let text = format!(
-            "allow_untrained = true\nallow_degraded = true\n[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\nwait = \"{wait}\"\n[gold]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\n",
+            "allow_untrained = true\nallow_degraded = true\n[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\n{waiting}\n[gold]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\n",
             settings.prefix,
             settings.root,
             model.display(),
@@ -98,9 +97,19 @@ fn state(sequence: u64) -> RavenState {
     state
 }
 
-/// Measures one way of waiting for `seconds`; adds its rows to the table.
-pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {
-    let mut world = World::start(wait, service_core)?;
+/// What one run of the service came to.
+struct Measured {
+    /// State sent to pose read, ns.
+    whole: Vec<i64>,
+    /// The robot's own call, ns.
+    handed_over: Vec<i64>,
+    missed: u64,
+    stats: Stats,
+}
+
+/// One service for `seconds`, with these lines in its `[loop]` table.
+fn measure(waiting: &str, service_core: usize, seconds: u64) -> Result<Measured, String> {
+    let mut world = World::start(waiting, service_core)?;
     let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
     let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
     let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
@@ -137,17 +146,57 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
     if valid * 2 < whole.len() as u64 {
         return Err(format!("only {valid} of {} answers were valid: this measures fallback", whole.len()));
     }
-    let mut row = quantiles(&mut whole).to_vec();
-    row.push(missed as f64);
+    Ok(Measured { whole, handed_over, missed, stats })
+}
+
+/// Measures one way of waiting for `seconds`; adds its rows to the table.
+pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {
+    let mut measured = measure(&format!("wait = \"{wait}\""), service_core, seconds)?;
+    let mut row = quantiles(&mut measured.whole).to_vec();
+    row.push(measured.missed as f64);
     table.row(&format!("{wait}: state sent -> pose read, two processes"), &row);
-    let mut row = quantiles(&mut handed_over).to_vec();
+    let mut row = quantiles(&mut measured.handed_over).to_vec();
     row.push(f64::NAN);
     table.row("    the robot's own publish call", &row);
     for name in ["input_age", "features", "inference", "publish", "total", "input_to_output", "wakeup"] {
-        if let Some(stage) = stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
+        if let Some(stage) = measured.stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
             let us = |ns: u64| ns as f64 / 1000.0;
             table.row(&format!("    {name}"), &[us(stage.p50), us(stage.p99), us(stage.p999), us(stage.max), f64::NAN]);
         }
     }
     Ok(())
+}
+
+/// What polling longer and reading the weights meanwhile bring, in the default mode: each alone, both and neither, round by round.
+pub(crate) fn means(service_core: usize, rounds: usize, seconds: u64) -> Result<Table, String> {
+    const MEANS: [(&str, &str); 4] = [
+        ("both, as by default", ""),
+        ("polling 200 us before a state is due, not 400", "spin_us = 200"),
+        ("weights not kept warm", "keep_warm = false"),
+        ("neither", "spin_us = 200\nkeep_warm = false"),
+    ];
+    let mut all: [Option<Measured>; 4] = Default::default();
+    for round in 0..rounds {
+        for turn in 0..MEANS.len() {
+            let at = (turn + round) % MEANS.len();
+            let mut found = measure(MEANS[at].1, service_core, seconds)?;
+            match &mut all[at] {
+                Some(sum) => {
+                    sum.whole.append(&mut found.whole);
+                    sum.missed += found.missed;
+                }
+                empty => *empty = Some(found),
+            }
+        }
+    }
+    let title = format!("State sent -> pose read, {rounds} x {seconds} s each");
+    let mut table = Table::new(&title, &["p50", "p99", "p99.9", "max", "missed"]);
+    for ((name, _), measured) in MEANS.iter().zip(&mut all) {
+        if let Some(measured) = measured {
+            let mut row = quantiles(&mut measured.whole).to_vec();
+            row.push(measured.missed as f64);
+            table.row(name, &row);
+        }
+    }
+    Ok(table)
 }

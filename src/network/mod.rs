@@ -10,6 +10,7 @@ mod instructions;
 mod rows;
 #[cfg(target_arch = "x86_64")]
 mod tiles;
+mod warmth;
 
 pub use deviation::{Choice, Deviation, NotExactEnough, RANDOM_INPUTS, choose};
 pub use format::{Format, UnknownFormat};
@@ -28,6 +29,9 @@ const SMALLEST_WEIGHT: f32 = 1e-30;
 /// Most inputs of a layer whose sums of products of bytes fit in 32 bits.
 #[cfg(target_arch = "x86_64")]
 const TILES_INPUTS_MAX: usize = 65_000;
+
+/// Lines of weights that one call of [`Plan::keep_warm`] reads: 8 KiB, a fraction of a microsecond.
+const WARM_LINES: usize = 128;
 
 /// Random inputs over which the mean of each layer's inputs is taken.
 const MEAN_INPUTS: usize = 64;
@@ -60,6 +64,8 @@ pub struct Plan {
     digits: Digits,
     instruction_set: InstructionSet,
     format: Format,
+    /// Where [`Plan::keep_warm`] goes on: layer and line.
+    warm: (usize, usize),
 }
 
 fn lanes(width: usize) -> usize {
@@ -128,6 +134,7 @@ impl Plan {
             digits: Digits::new(widest),
             instruction_set,
             format,
+            warm: (0, 0),
         }
     }
 
@@ -159,6 +166,16 @@ impl Plan {
     /// Bytes of weights that one run reads.
     pub fn bytes(&self) -> usize {
         self.memory().map(<[u8]>::len).sum()
+    }
+
+    /// Reads the next 8 KiB of the weights, round and round with each call. Called by whoever waits for an input, so that a run finds
+    /// its weights in the caches and the vector unit awake: after a sleep neither is.
+    pub fn keep_warm(&mut self) {
+        let (layer, line) = self.warm;
+        let lines = self.layers.get(layer).map_or(&[][..], |layer| layer.weights.lines());
+        let end = lines.len().min(line + WARM_LINES);
+        warmth::touch(self.instruction_set, lines.get(line..end).unwrap_or_default());
+        self.warm = if end < lines.len() { (layer, end) } else { ((layer + 1) % self.layers.len().max(1), 0) };
     }
 
     /// Evaluates the network. `input` and `output` must have the plan's widths; what is missing reads as zero, what is too much is
@@ -228,5 +245,32 @@ impl Weights {
             #[cfg(target_arch = "x86_64")]
             Self::Tiles(tiles) => tiles.lines(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Format, InstructionSet, Plan};
+    use ravenpose_importer::{Activation, Network};
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn keeping_warm_reads_every_line_of_every_layer_once_a_round() {
+        let network = Network::dense(&[30, 500, 70, 3], Activation::Tanh, |place, inputs| place as f32 / inputs as f32);
+        let mut plan = Plan::with(&network, InstructionSet::best(), Format::I16);
+        let mut read = 0;
+        let mut places = BTreeSet::new();
+        loop {
+            let (layer, line) = plan.warm;
+            plan.keep_warm();
+            let end =
+                if plan.warm.0 == layer && plan.warm.1 > line { plan.warm.1 } else { plan.layers[layer].weights.lines().len() };
+            assert!(places.insert((layer, line)) && end > line && end - line <= super::WARM_LINES);
+            read += end - line;
+            if plan.warm == (0, 0) {
+                break;
+            }
+        }
+        assert_eq!(read * 64, plan.bytes());
     }
 }
