@@ -20,6 +20,7 @@ mod simulate;
 mod stats;
 mod train;
 mod vision;
+mod webcams;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -137,6 +138,8 @@ enum Command {
         /// Stop by itself after so many seconds
         #[arg(long)]
         seconds: Option<f64>,
+        #[command(flatten)]
+        webcams: webcams::Wish,
     },
     /// Runs of a simulated robot at 1 kHz and where the arm really was: full states of a RAVEN-II, tables of any other arm
     Simulate {
@@ -221,7 +224,7 @@ fn main() -> ExitCode {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch })
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
-        Command::Record { out, seconds } => record::run(&out, seconds),
+        Command::Record { out, seconds, webcams } => record::run(&out, seconds, &webcams),
         Command::Simulate { minutes, seed, homing_seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
             simulate::run(&simulate::Wish {
                 minutes,

@@ -1,14 +1,15 @@
-//! `ravenpose record`: the running service's states and poses into an MCAP file, on one clock.
+//! `ravenpose record`: the running service's states and poses, and webcams' images, into an MCAP file, on one clock.
 //!
 //! A listening thread (real-time where the rights allow it) empties the two links every millisecond and stamps what comes
 //! with the wall clock as it was at the start plus the monotonic time since; a writing thread compresses and writes. What is
 //! written stands as `NAME.part` until the end: a kill leaves all but the last second there.
 
+use crate::webcams::{self, Image, Webcams};
 use ravenpose::{realtime, signals};
 use ravenpose_transport::{Reader, Settings};
 use ravenpose_wire::{ArmPose, CorrectedPose, RavenState};
 use recordings::mcap_file::{LogChannel, McapLog};
-use recordings::ros::MessageType;
+use recordings::ros::{COMPRESSED_IMAGE, CompressedImage, Header, MessageType, camera_topic};
 use recordings::stream::{Record, Sink};
 use std::path::Path;
 use std::process::ExitCode;
@@ -37,10 +38,31 @@ uint32 status\nuint32 flags\nuint64 model_id\nuint32 reset_count\nfloat32 domain
 float64[3] correction_um\nfloat64[3] corrected_position_um\nfloat64[3] bound95_um\nfloat32[9] orientation\nuint32 hold_cycles\n",
 };
 
-/// What the listening thread hands over, with its time in ns since 1970.
+/// The one clock: the wall's as it was at the start plus the monotonic time since.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clock {
+    offset_ns: i64,
+}
+
+impl Clock {
+    fn start() -> Self {
+        let wall_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64);
+        Self { offset_ns: wall_ns - ravenpose_transport::now_ns() }
+    }
+
+    /// A time of `CLOCK_MONOTONIC` as ns since 1970.
+    pub(crate) fn stamp(self, monotonic_ns: i64) -> u64 {
+        (monotonic_ns + self.offset_ns).max(0) as u64
+    }
+}
+
+/// What the threads hand over, with its time in ns since 1970.
 enum Heard {
     State(u64, Box<RavenState>),
     Pose(u64, Box<CorrectedPose>),
+    Image(Image),
+    /// Nothing follows that is waited for: a camera that hangs may hold on to its end of the channel.
+    End,
 }
 
 /// What was heard and what was missed.
@@ -76,7 +98,7 @@ impl Tally {
     }
 }
 
-pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> {
+pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> Result<ExitCode, String> {
     if seconds.is_some_and(|seconds| !(seconds > 0.0 && seconds < 1e9)) {
         return Err("--seconds: must be a number above 0".to_owned());
     }
@@ -84,21 +106,30 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
         return Err(format!("{}: is there already; choose another --out or remove it", out.display()));
     }
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
+    let clock = Clock::start();
+    let (sender, receiver) = sync_channel(WAITING_MAX);
+    // Cameras wait for room where the listener may not; too few images are let in to fill the channel.
+    let (images, ending) = (sender.clone(), sender.clone());
+    let webcams = Webcams::open(cameras, clock, &move |image| drop(images.send(Heard::Image(image))))?;
     let metadata = [("recorder", "ravenpose record"), ("clock", "wall clock at the start plus CLOCK_MONOTONIC since")];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let mut log = McapLog::create(out, &metadata).map_err(|error| error.to_string())?;
     let poses = log.add_channel("/ravenpose/pose", &POSE).map_err(|error| error.to_string())?;
-    let (sender, receiver) = sync_channel(WAITING_MAX);
+    let mut channels = Vec::new();
+    for webcam in &webcams.all {
+        let channel = log.add_channel(&camera_topic(&webcam.name), &COMPRESSED_IMAGE).map_err(|error| error.to_string())?;
+        channels.push((webcam.name.clone(), channel));
+    }
     let stop = AtomicBool::new(false);
     say!("recording to {}; Ctrl-C ends it", log.part().display());
     let begun = Instant::now();
     let (tally, written) = std::thread::scope(|scope| {
         let listening = scope.spawn({
             let stop = &stop;
-            // The sender goes along: the writer ends when the listener has ended.
-            move || listen(&sender, stop)
+            move || listen(&sender, clock, stop)
         });
-        let writing = scope.spawn(move || write(log, poses, &receiver));
+        let writing = scope.spawn(move || write(log, poses, &channels, &receiver));
+        webcams.begin();
         while seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds)
             && !listening.is_finished()
             && !writing.is_finished()
@@ -107,8 +138,12 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
                 break;
             }
         }
+        webcams.stop();
         stop.store(true, Ordering::Relaxed);
-        (listening.join(), writing.join())
+        let heard = listening.join();
+        // A writer that has failed is gone.
+        drop(ending.send(Heard::End));
+        (heard, writing.join())
     });
     let (Ok(tally), Ok(written)) = (tally, written) else { return Err("a thread of the recorder failed".to_owned()) };
     written?;
@@ -122,10 +157,17 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>) -> Result<ExitCode, String> 
         tally.lost_states,
         tally.lost_poses
     );
-    Ok(if tally.lost_states + tally.lost_poses == 0 { ExitCode::SUCCESS } else { ExitCode::from(LOST) })
+    let mut whole = tally.lost_states + tally.lost_poses == 0;
+    for (name, camera) in webcams.outcomes() {
+        let fault = camera.fault.as_ref().map_or_else(String::new, |fault| format!("; ended early: {fault}"));
+        let gap_ms = camera.longest_gap_ns / 1_000_000;
+        say!("  {name}: {} images, {} missed, {gap_ms} ms at most between two{fault}", camera.images, camera.missed);
+        whole &= camera.missed == 0 && camera.fault.is_none();
+    }
+    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(LOST) })
 }
 
-fn listen(sender: &SyncSender<Heard>, stop: &AtomicBool) -> Result<Tally, String> {
+fn listen(sender: &SyncSender<Heard>, clock: Clock, stop: &AtomicBool) -> Result<Tally, String> {
     // Without the right it listens all the same; 64 ms of patience are usually enough.
     if let Err(missing) = realtime::set_fifo(PRIORITY) {
         say!("note: no real-time priority for the recorder ({missing}); messages may be missed on a busy machine");
@@ -133,23 +175,20 @@ fn listen(sender: &SyncSender<Heard>, stop: &AtomicBool) -> Result<Tally, String
     let settings = Settings::from_env();
     let states = Reader::<RavenState>::open(&settings, DEPTH).map_err(|error| error.to_string())?;
     let poses = Reader::<CorrectedPose>::open(&settings, DEPTH).map_err(|error| error.to_string())?;
-    let wall_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64);
-    let offset_ns = wall_ns - ravenpose_transport::now_ns();
-    let stamp = |monotonic_ns: i64| (monotonic_ns + offset_ns).max(0) as u64;
     let mut tally = Tally::default();
     let mut full = false;
     while !stop.load(Ordering::Relaxed) {
         let taken = states.drain(|state| {
             if state.admit().is_ok() {
                 tally.state(state);
-                full |= sender.try_send(Heard::State(stamp(state.source_time_ns), Box::new(*state))).is_err();
+                full |= sender.try_send(Heard::State(clock.stamp(state.source_time_ns), Box::new(*state))).is_err();
             }
         });
         taken.map_err(|error| error.to_string())?;
         let taken = poses.drain(|pose| {
             if pose.admit().is_ok() {
                 tally.pose(pose);
-                full |= sender.try_send(Heard::Pose(stamp(pose.publish_time_ns), Box::new(*pose))).is_err();
+                full |= sender.try_send(Heard::Pose(clock.stamp(pose.publish_time_ns), Box::new(*pose))).is_err();
             }
         });
         taken.map_err(|error| error.to_string())?;
@@ -161,7 +200,7 @@ fn listen(sender: &SyncSender<Heard>, stop: &AtomicBool) -> Result<Tally, String
     Ok(tally)
 }
 
-fn write(mut log: McapLog, poses: LogChannel, receiver: &Receiver<Heard>) -> Result<(), String> {
+fn write(mut log: McapLog, poses: LogChannel, cameras: &[(String, LogChannel)], receiver: &Receiver<Heard>) -> Result<(), String> {
     let mut bytes = Vec::new();
     let failed = |error: recordings::stream::StreamError| error.to_string();
     loop {
@@ -171,8 +210,16 @@ fn write(mut log: McapLog, poses: LogChannel, receiver: &Receiver<Heard>) -> Res
                 encode(&pose, &mut bytes);
                 log.write_message(poses, time_ns, pose.sequence as u32, &bytes).map_err(failed)?;
             }
+            Ok(Heard::Image(image)) => {
+                let Some((name, channel)) = cameras.get(image.camera) else { continue };
+                bytes.clear();
+                let Image { time_ns, number, jpeg, waiting, .. } = image;
+                CompressedImage { header: Header::at(number, time_ns), data: jpeg }.encode(name, &mut bytes);
+                log.write_message(*channel, time_ns, number, &bytes).map_err(failed)?;
+                drop(waiting);
+            }
             Err(RecvTimeoutError::Timeout) => log.tick().map_err(failed)?,
-            Err(RecvTimeoutError::Disconnected) => return Box::new(log).finish().map_err(failed),
+            Ok(Heard::End) | Err(RecvTimeoutError::Disconnected) => return Box::new(log).finish().map_err(failed),
         }
     }
 }

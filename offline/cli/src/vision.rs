@@ -5,8 +5,10 @@ use ::vision::commands::{self, Calibrated};
 use ::vision::marking::Marking;
 use ::vision::marking::server::Server;
 use ::vision::track::{Mode, Tracked};
-use ::vision::video::{self, Source};
+use ::vision::video::{self, Shot, Source};
 use clap::Subcommand;
+use recordings::mcap_file::ImageSource;
+use recordings::stream::StreamError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -43,7 +45,7 @@ pub(crate) enum Wish {
     },
     /// Frames of a scene from webcams or video files, one per camera
     Record {
-        /// CAMERA=SOURCE: a name of rig.toml, and /dev/videoN or a video file
+        /// CAMERA=SOURCE: a name of rig.toml, and /dev/videoN, a video file or a recording of `ravenpose record`
         #[arg(required = true)]
         sources: Vec<String>,
         /// Folder with rig.toml
@@ -168,6 +170,33 @@ fn tracked_words(tracked: &Tracked) -> String {
     lines.join("\n") + "\n"
 }
 
+/// A camera's images in a recording of `ravenpose record`.
+struct Recorded {
+    path: PathBuf,
+    images: ImageSource,
+}
+
+impl Recorded {
+    fn open(path: &Path, camera: &str) -> Result<Self, String> {
+        let images = ImageSource::open(path, camera).map_err(|error| error.to_string())?;
+        Ok(Self { path: path.to_owned(), images })
+    }
+}
+
+impl Source for Recorded {
+    fn next(&mut self) -> ::vision::Result<Option<Shot>> {
+        let image = self.images.next_image().map_err(|error| {
+            let StreamError { what, remedy, .. } = error;
+            ::vision::Error::content(&self.path, "images", what, remedy)
+        })?;
+        Ok(image.map(|image| Shot { t_s: image.time_ns as f64 / 1e9, jpeg: image.jpeg }))
+    }
+
+    fn since_1970(&self) -> bool {
+        true
+    }
+}
+
 fn record(
     sources: &[String],
     rig: &Path,
@@ -188,7 +217,11 @@ fn record(
         if opened[index].is_some() {
             return Err(format!("{source}: camera {name} has a source already; give each camera one"));
         }
-        let own = video::open(Path::new(path), ffmpeg, rig.size_px, frames_per_s).map_err(|error| error.to_string())?;
+        let own = if Path::new(path).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
+            Box::new(Recorded::open(Path::new(path), name)?)
+        } else {
+            video::open(Path::new(path), ffmpeg, rig.size_px, frames_per_s).map_err(|error| error.to_string())?
+        };
         if own.live() && seconds.is_none() {
             return Err(format!("{source}: a webcam has no end; say how long with --seconds"));
         }

@@ -3,8 +3,9 @@
 
 use ravenpose_transport::{Settings, Writer, now_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
-use recordings::mcap_file::McapSource;
+use recordings::mcap_file::{ImageSource, McapSource};
 use recordings::stream::{Record, Source};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,8 +26,12 @@ impl World {
     }
 
     fn record(&self, out: &Path, seconds: Option<&str>) -> Child {
+        self.record_with(out, seconds, &[])
+    }
+
+    fn record_with(&self, out: &Path, seconds: Option<&str>, more: &[&str]) -> Child {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
-        command.args(["record", "--out"]).arg(out).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(["record", "--out"]).arg(out).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.env("RAVENPOSE_PREFIX", &self.settings.prefix).env("RAVENPOSE_ROOT", &self.settings.root);
         if let Some(seconds) = seconds {
             command.args(["--seconds", seconds]);
@@ -110,19 +115,23 @@ fn what_is_recorded_is_whole_and_in_order() {
     assert!(!out.with_extension("mcap.part").exists());
 }
 
+/// States, poses and four webcams of 1280 x 720 px, 20 images a second each.
 /// `RAVENPOSE_RECORD_SECONDS=3600 cargo test --release -p ravenpose-cli --test record -- --nocapture nothing_is_lost` is the hour.
 #[test]
 fn nothing_is_lost() {
     let world = World::new("long");
     let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
+    let program = webcam(&world, "camera", [1280, 720], "1000000");
+    let mut more = vec!["--ffmpeg", program.to_str().expect("UTF-8"), "--frames-per-s", "20"];
+    more.extend(["--camera", "cam0=/dev/null", "--camera", "cam1=/dev/null"]);
+    more.extend(["--camera", "cam2=/dev/null", "--camera", "cam3=/dev/null"]);
     let seconds = std::env::var("RAVENPOSE_RECORD_SECONDS").unwrap_or_else(|_| "5".to_owned());
     std::thread::scope(|scope| {
         let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let output = world.record(&out, Some(&seconds)).wait_with_output().expect("output");
+        let (_, said) = said(world.record_with(&out, Some(&seconds), &more));
         stop.store(true, Ordering::Relaxed);
         let sent = publisher.join().expect("publisher");
-        let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         let mut source = McapSource::open(&out).expect("MCAP");
         let (mut states, mut last) = (0_u64, None);
         let mut missed = 0;
@@ -133,8 +142,11 @@ fn nothing_is_lost() {
                 states += 1;
             }
         }
-        println!("{states} states of {sent} in the file, {missed} missed; {said}");
-        assert!(seconds == "5" || said.contains("recorder: 0 states"), "{said}");
+        let images =
+            source.channels().iter().filter(|channel| channel.topic.starts_with("/camera/")).map(|c| c.messages).sum::<u64>();
+        println!("{images} images, {states} states of {sent} in the file, {missed} missed; {said}");
+        assert!(seconds == "5" || said.contains("recorder: 0 states") && said.matches(" images, 0 missed").count() == 4, "{said}");
+        assert!(images as f64 > 4.0 * 10.0 * (seconds.parse::<f64>().expect("seconds") - 2.0), "{said}");
         assert!(states as f64 > 900.0 * (seconds.parse::<f64>().expect("seconds") - 2.0), "{said}");
         // A machine that other tests load may stall a process for longer than a thousand states.
         if seconds != "5" {
@@ -178,4 +190,141 @@ fn nothing_is_overwritten() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("is there already"));
     assert_eq!(std::fs::read_to_string(&out).expect("file"), "mine");
+}
+
+/// A program that sends four images in turn, as ffmpeg sends a webcam's: 20 a second, or so many and no more.
+fn webcam(world: &World, name: &str, [w, h]: [u32; 2], images: &str) -> PathBuf {
+    let chunk = |id: &[u8], content: &[u8]| {
+        let mut all = [id, &(content.len() as u32).to_le_bytes(), content].concat();
+        all.resize(all.len() + content.len() % 2, 0);
+        all
+    };
+    let mut header = [&b"vidsMJPG"[..], &[0; 12], &1_u32.to_le_bytes(), &20_u32.to_le_bytes()].concat();
+    header.resize(56, 0);
+    let stream = chunk(b"LIST", &[&b"strl"[..], &chunk(b"strh", &header)].concat());
+    let head = chunk(b"LIST", &[&b"hdrl"[..], &stream].concat());
+    let size = 0x7fff_ff00_u32.to_le_bytes();
+    let begin = [b"RIFF", &size[..], b"AVI ", &head, b"LIST", &size, b"movi"].concat();
+    std::fs::write(world.folder.join(format!("{name}-begin")), begin).expect("file");
+    for index in 0..4_u32 {
+        let mut jpeg = Vec::new();
+        let picture = image::GrayImage::from_fn(w, h, |x, y| image::Luma([((x + 40 * index) / 3 + y * y / 400) as u8]));
+        image::codecs::jpeg::JpegEncoder::new(&mut jpeg).encode_image(&picture).expect("image");
+        std::fs::write(world.folder.join(format!("{name}-{index}")), chunk(b"00dc", &jpeg)).expect("file");
+    }
+    let program = world.folder.join(format!("{name}-ffmpeg"));
+    let stem = world.folder.join(name);
+    let stem = stem.display();
+    let script = format!(
+        "#!/bin/sh\ncat {stem}-begin\nn=0\nwhile [ $n -lt {images} ]; do cat {stem}-$((n % 4)) || exit; n=$((n + 1)); sleep 0.05; done\n"
+    );
+    std::fs::write(&program, script).expect("script");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("script");
+    program
+}
+
+fn said(child: Child) -> (Option<i32>, String) {
+    let output = child.wait_with_output().expect("output");
+    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr))
+}
+
+#[test]
+fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
+    let world = World::new("webcams");
+    let program = webcam(&world, "camera", [64, 48], "1000000");
+    let stop = AtomicBool::new(false);
+    let out = world.folder.join("run.mcap");
+    std::thread::scope(|scope| {
+        let publisher = scope.spawn(|| publish(&world.settings, &stop));
+        let ffmpeg = program.to_str().expect("UTF-8");
+        // Any device stands for the webcam: the program asks nothing of it.
+        let more = ["--ffmpeg", ffmpeg, "--camera", "cam0=/dev/null", "--camera", "cam1=/dev/zero", "--image-size", "64x48"];
+        let (code, said) = said(world.record_with(&out, Some("3"), &more));
+        stop.store(true, Ordering::Relaxed);
+        let _ = publisher.join().expect("publisher");
+        assert!(code.is_some_and(|code| code < 2) && said.contains("cam0: ") && said.contains("cam1: "), "{said}");
+    });
+    let states = states_of(&out);
+    assert!(states.len() > 500);
+    let mut source = McapSource::open(&out).expect("MCAP");
+    while source.next().expect("record").is_some() {}
+    let channels = source.channels();
+    for camera in ["cam0", "cam1"] {
+        let mut images = ImageSource::open(&out, camera).expect("images");
+        let all: Vec<_> = std::iter::from_fn(|| images.next_image().expect("image")).collect();
+        let topic = format!("/camera/{camera}/compressed");
+        let shown = channels.iter().find(|channel| channel.topic == topic).expect("channel");
+        assert_eq!((shown.messages, shown.type_name.as_str()), (all.len() as u64, "sensor_msgs/CompressedImage"));
+        assert!(all.len() >= 10 && all.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns));
+        // The four pictures in turn, each whole.
+        let begin = |name: usize| std::fs::read(world.folder.join(format!("camera-{name}"))).expect("file")[8..].to_vec();
+        let first = (0..4).find(|&name| begin(name).starts_with(&all[0].jpeg)).expect("one of the pictures");
+        for (index, image) in all.iter().enumerate() {
+            assert!(begin((first + index) % 4).starts_with(&image.jpeg) && image.jpeg.len() > 100, "{index}");
+        }
+        // On one clock: the images lie in the time in which states were heard, or a moment beside it.
+        let span_ns = states.last().expect("state").source_time_ns - states[0].source_time_ns;
+        let images_ns = all.last().expect("image").time_ns - all[0].time_ns;
+        assert!((images_ns - span_ns).abs() < 1_500_000_000, "{images_ns} of {span_ns}");
+    }
+    let absent = ImageSource::open(&out, "cam7").expect("MCAP").next_image().expect_err("no such camera").to_string();
+    assert!(absent.contains("/camera/cam7/compressed") && absent.contains("/camera/cam0/compressed"), "{absent}");
+
+    let rig = world.folder.join("rig");
+    std::fs::create_dir_all(&rig).expect("folder");
+    let camera = |name: &str| {
+        format!(
+            "[[camera]]\nname = \"{name}\"\nfx = 60.0\nfy = 60.0\ncx = 32.0\ncy = 24.0\ndistortion = [0.0, 0.0, 0.0, 0.0]\n\
+             chessboard_origin_mm = [0.0, 0.0, 0.0]\nchessboard_rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n"
+        )
+    };
+    let head = "resolution = [64, 48]\n[chessboard]\nsquare_mm = 9.0\ninner_corners = [8, 6]\n[fixture]\nball_offset_mm = 38.0\n\
+                ball_radius_mm = 20.0\nx_ball = \"green\"\ny_ball = \"yellow\"\nneg_x_ball = \"red\"\n";
+    std::fs::write(rig.join("rig.toml"), head.to_owned() + &camera("cam0") + &camera("cam1")).expect("file");
+    let scene = world.folder.join("scene");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
+    command.args(["vision", "record", "--frames-per-s", "20", "--rig"]).arg(&rig).arg("--out").arg(&scene);
+    let output = command.args(["cam0", "cam1"].map(|name| format!("{name}={}", out.display()))).output().expect("runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let frames = std::fs::read_to_string(scene.join("frames.csv")).expect("frames.csv");
+    let start: f64 =
+        frames.lines().next().and_then(|line| line.strip_prefix("# start_unix_s = ")).expect("start").parse().expect("s");
+    let first = ImageSource::open(&out, "cam0").expect("images").next_image().expect("image").expect("image").time_ns;
+    assert!((start - first as f64 / 1e9).abs() < 1.0, "{start} {first}");
+    assert!(frames.lines().count() > 10, "{frames}");
+}
+
+#[test]
+fn a_webcam_that_fails_does_not_stop_the_recording() {
+    let world = World::new("fails");
+    let program = webcam(&world, "short", [64, 48], "5");
+    let stop = AtomicBool::new(false);
+    let out = world.folder.join("run.mcap");
+    std::thread::scope(|scope| {
+        let publisher = scope.spawn(|| publish(&world.settings, &stop));
+        let more = ["--ffmpeg", program.to_str().expect("UTF-8"), "--camera", "cam0=/dev/null"];
+        let (code, said) = said(world.record_with(&out, Some("3"), &more));
+        stop.store(true, Ordering::Relaxed);
+        let _ = publisher.join().expect("publisher");
+        assert!(code == Some(1) && said.contains("ended early: it ended by itself"), "{code:?} {said}");
+    });
+    let states = states_of(&out);
+    assert!(states.last().expect("states").source_time_ns - states[0].source_time_ns > 1_500_000_000);
+}
+
+#[test]
+fn a_wrong_webcam_is_one_line_and_leaves_no_file() {
+    let world = World::new("wrong");
+    let out = world.folder.join("run.mcap");
+    for (camera, words) in [
+        ("cam0", "is not NAME=DEVICE"),
+        ("a b=/dev/null", "letters, digits"),
+        ("cam0=clip.avi", "vision record"),
+        ("cam0=/dev/video-of-nobody", "no such device"),
+    ] {
+        let (code, said) = said(world.record_with(&out, Some("1"), &["--camera", camera]));
+        assert!(code == Some(2) && said.trim().lines().count() == 1 && said.contains(words), "{code:?} {said}");
+        assert!(!out.exists() && !out.with_extension("mcap.part").exists());
+    }
 }

@@ -7,8 +7,8 @@ mod records;
 use md5::{Digest, Md5};
 use ravenpose_wire::RavenState;
 use recordings::ros::{
-    DefinitionError, Header, JOINT_STATE, JointState, KEY_VALUE, MessageError, MessageType, POSE_STAMPED, PoseStamped, RAVEN_STATE,
-    STATE_BYTES, STATE_ORIGIN, StateDecoder, StateOrigin, decode_state, encode_state,
+    COMPRESSED_IMAGE, DefinitionError, Header, JOINT_STATE, JointState, KEY_VALUE, MessageError, MessageType, POSE_STAMPED,
+    PoseStamped, RAVEN_STATE, STATE_BYTES, STATE_ORIGIN, StateDecoder, StateOrigin, decode_state, encode_state,
 };
 use records::Random;
 
@@ -46,7 +46,8 @@ fn sections<'a>(name: &'a str, definition: &'a str) -> Vec<(&'a str, &'a str)> {
 fn the_definitions_have_the_md5_that_ros_gives_them() {
     // RAVEN's: ravenstate.md, section 1; the others': ROS's own message files.
     assert_eq!(RAVEN_STATE.md5, "ce9e7f4969049d8bb365de3c98461a01");
-    for MessageType { name, md5, definition } in [RAVEN_STATE, STATE_ORIGIN, POSE_STAMPED, JOINT_STATE, KEY_VALUE] {
+    for MessageType { name, md5, definition } in [RAVEN_STATE, STATE_ORIGIN, POSE_STAMPED, JOINT_STATE, COMPRESSED_IMAGE, KEY_VALUE]
+    {
         assert_eq!(ros_md5(name, &sections(name, definition)), md5, "{name}");
     }
 }

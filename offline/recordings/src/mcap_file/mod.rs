@@ -14,11 +14,13 @@
 mod channels;
 mod chunk;
 mod framing;
+mod images;
 mod log;
 mod reader;
 mod records;
 mod writer;
 
+pub use images::{ImageSource, StampedImage};
 pub use log::{LogChannel, McapLog};
 pub use reader::McapSource;
 pub use writer::McapSink;

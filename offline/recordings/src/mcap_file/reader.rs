@@ -71,6 +71,29 @@ impl<R: Read> McapSource<R> {
         Ok(source)
     }
 
+    /// From here on the images of this camera are kept.
+    pub(super) fn want_images(&mut self, camera: &str) {
+        self.assembler.want_images(camera);
+    }
+
+    /// The next image of that camera; records on the way are passed over.
+    pub(super) fn next_image(&mut self) -> Result<Option<(i64, Vec<u8>)>, StreamError> {
+        loop {
+            while self.assembler.next().is_some() {}
+            if let Some(image) = self.assembler.next_image() {
+                return Ok(Some(image));
+            }
+            if self.part == Part::End {
+                return Ok(None);
+            }
+            self.advance()?;
+        }
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Reads one record, of the file or of the chunk at hand. Damage and errors end the stream here.
     fn advance(&mut self) -> Result<(), StreamError> {
         let stopped = if self.chunk.is_empty() { self.outer() } else { self.inner() };

@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use arm::{JOINTS, Side};
 
 use super::bytes::{Header, MessageError};
-use super::definitions::{JOINT_STATE, KEY_VALUE, MessageType, POSE_STAMPED, RAVEN_STATE, STATE_ORIGIN};
-use super::emission::{METADATA_TOPIC, truth_topic};
+use super::definitions::{COMPRESSED_IMAGE, JOINT_STATE, KEY_VALUE, MessageType, POSE_STAMPED, RAVEN_STATE, STATE_ORIGIN};
+use super::emission::{METADATA_TOPIC, camera_topic, truth_topic};
 use super::layout::{DefinitionError, Layout};
-use super::messages::{JointState, PoseStamped, StateOrigin, decode_pair};
+use super::messages::{CompressedImage, JointState, PoseStamped, StateOrigin, decode_pair};
 use super::state::StateDecoder;
 use crate::stream::{Record, Truth};
 
@@ -31,6 +31,8 @@ pub(crate) enum Role {
     Joints(Side),
     ExternalJoints,
     Metadata,
+    /// Of the camera whose topic this is.
+    Image(String),
 }
 
 impl Role {
@@ -52,6 +54,9 @@ impl Role {
         }
         if type_name == KEY_VALUE.name && topic == METADATA_TOPIC.name {
             return Some((KEY_VALUE, Self::Metadata));
+        }
+        if type_name == COMPRESSED_IMAGE.name {
+            return Some((COMPRESSED_IMAGE, Self::Image(topic.to_owned())));
         }
         if type_name == JOINT_STATE.name && topic == EXTERNAL_JOINTS {
             return Some((JOINT_STATE, Self::ExternalJoints));
@@ -102,12 +107,25 @@ pub(crate) struct Assembler {
     arms: u32,
     metadata: Vec<(String, String)>,
     metadata_bytes: usize,
+    /// Topic of the images that are wanted, and those that are ready, with their times in ns.
+    camera: Option<String>,
+    images: VecDeque<(i64, Vec<u8>)>,
 }
 
 impl Assembler {
     /// The next complete record.
     pub(crate) fn next(&mut self) -> Option<Record> {
         self.ready.pop_front()
+    }
+
+    /// From here on the images of a camera are kept; without it none are.
+    pub(crate) fn want_images(&mut self, camera: &str) {
+        self.camera = Some(camera_topic(camera));
+    }
+
+    /// The next image of that camera and its time, ns.
+    pub(crate) fn next_image(&mut self) -> Option<(i64, Vec<u8>)> {
+        self.images.pop_front()
     }
 
     /// Pairs so far.
@@ -150,6 +168,13 @@ impl Assembler {
             }
             Role::Joints(side) => self.take_joints(*side, time_ns, bytes),
             Role::ExternalJoints => self.take_external(time_ns, bytes),
+            Role::Image(topic) => {
+                if self.camera.as_ref() == Some(topic) {
+                    let image = CompressedImage::decode(bytes)?;
+                    self.images.push_back((stamp(image.header, time_ns), image.data));
+                }
+                Ok(())
+            }
             Role::Metadata => {
                 let (key, value) = decode_pair(bytes)?;
                 self.take_pair(key, value)

@@ -153,6 +153,12 @@ impl Header {
         i64::from(self.stamp_sec) * 1_000_000_000 + i64::from(self.stamp_nsec)
     }
 
+    /// With a time stamp of so many ns since 1970, up to the year 2106.
+    pub fn at(seq: u32, time_ns: u64) -> Self {
+        let (sec, nsec) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
+        Self { seq, stamp_sec: u32::try_from(sec).unwrap_or(u32::MAX), stamp_nsec: nsec as u32 }
+    }
+
     /// Reads a header; its frame name is passed over.
     pub(crate) fn take(cursor: &mut Cursor<'_>) -> Result<Self, MessageError> {
         let header = Self {

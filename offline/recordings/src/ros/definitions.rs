@@ -112,6 +112,13 @@ pub const JOINT_STATE: MessageType = MessageType {
     ),
 };
 
+/// An image as a file of its format, here the JPEG of a webcam.
+pub const COMPRESSED_IMAGE: MessageType = MessageType {
+    name: "sensor_msgs/CompressedImage",
+    md5: "8f7a12909da2c9d3332d540a0977563f",
+    definition: with_header!("std_msgs/Header header\n", "string format\n", "uint8[] data\n"),
+};
+
 /// A name and its value; bags have no other place for what MCAP calls metadata.
 pub const KEY_VALUE: MessageType = MessageType {
     name: "diagnostic_msgs/KeyValue",

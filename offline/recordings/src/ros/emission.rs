@@ -64,6 +64,11 @@ pub(crate) enum Unfit {
     Time(i64),
 }
 
+/// Topic of a camera's images.
+pub fn camera_topic(camera: &str) -> String {
+    format!("/camera/{camera}/compressed")
+}
+
 /// Turns records into messages. Truths are numbered: pose and joints of one truth have one number.
 #[derive(Debug, Default)]
 pub(crate) struct Emitter {

@@ -110,6 +110,39 @@ impl PoseStamped {
     }
 }
 
+/// `sensor_msgs/CompressedImage`.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CompressedImage {
+    /// Header; its frame name is not kept.
+    pub header: Header,
+    /// A file's content in the format that the message names.
+    pub data: Vec<u8>,
+}
+
+impl CompressedImage {
+    /// Appends it as bytes, as JPEG; `frame` is the camera.
+    pub fn encode(&self, frame: &str, out: &mut Vec<u8>) {
+        self.header.put(out, frame);
+        put_string(out, "jpeg");
+        out.extend_from_slice(&(self.data.len() as u32).to_le_bytes());
+        out.extend_from_slice(&self.data);
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// [`MessageError`] where the message is too short or too long, with the byte.
+    pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
+        let mut cursor = Cursor::new(bytes);
+        let header = Header::take(&mut cursor)?;
+        let _format = cursor.string("format")?;
+        // As text: a count and so many bytes.
+        let data = cursor.string("data")?.to_vec();
+        cursor.end()?;
+        Ok(Self { header, data })
+    }
+}
+
 /// `sensor_msgs/JointState`; an array is empty where nothing is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointState {

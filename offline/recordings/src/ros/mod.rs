@@ -7,6 +7,7 @@
 //! | `/ravenstate/origin` | `ravenpose/StateOrigin` | before each state, what that message has no field for |
 //! | `/truth/gold/pose`, `/truth/green/pose` | `geometry_msgs/PoseStamped` | true pose of the tip, m |
 //! | `/truth/gold/joints`, `/truth/green/joints` | `sensor_msgs/JointState` | true joints (rad, joint 3 m), cable force (N) as effort |
+//! | `/camera/NAME/compressed` | `sensor_msgs/CompressedImage` | images of a camera, JPEG ([`crate::mcap_file::ImageSource`]) |
 //!
 //! A bag also has `/ravenpose/metadata` (`diagnostic_msgs/KeyValue`), for which MCAP has records of its own.
 //!
@@ -26,9 +27,10 @@ mod messages;
 mod state;
 
 pub use bytes::{Header, MessageError};
-pub use definitions::{JOINT_STATE, KEY_VALUE, MessageType, POSE_STAMPED, RAVEN_STATE, STATE_ORIGIN};
+pub use definitions::{COMPRESSED_IMAGE, JOINT_STATE, KEY_VALUE, MessageType, POSE_STAMPED, RAVEN_STATE, STATE_ORIGIN};
+pub use emission::camera_topic;
 pub use layout::DefinitionError;
-pub use messages::{JointState, PoseStamped, StateOrigin};
+pub use messages::{CompressedImage, JointState, PoseStamped, StateOrigin};
 pub use state::{STATE_BYTES, StateDecoder, decode_state, encode_state};
 
 pub(crate) use assembly::{Assembler, admit_encoding};

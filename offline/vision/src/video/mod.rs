@@ -33,6 +33,11 @@ pub trait Source: Send {
     fn live(&self) -> bool {
         false
     }
+
+    /// Are its times since 1970, by a clock that other sources share? Those of live ones are.
+    fn since_1970(&self) -> bool {
+        self.live()
+    }
 }
 
 /// Opens a video file or, under `/dev/`, a webcam. `ffmpeg` is the program for all but AVI files of Motion JPEG; webcams are asked

@@ -59,7 +59,7 @@ fn all(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Recorded> {
-    let live = sources.iter().flatten().any(|source| source.live());
+    let since_1970 = sources.iter().flatten().any(|source| source.since_1970());
     let mut tracks: Vec<Option<Track>> = sources.into_iter().map(|source| source.map(Track::start)).collect();
     for (camera, _) in rig.cameras.iter().zip(&tracks).filter(|(_, track)| track.is_some()) {
         let folder = out.join("frames").join(&camera.name);
@@ -73,7 +73,7 @@ fn all(
     let step_s = 1.0 / frames_per_s;
     let most = seconds.map_or(0, |seconds| (seconds * frames_per_s).round().max(1.0) as usize);
     let mut list = String::new();
-    if live {
+    if since_1970 {
         let _ = writeln!(list, "# start_unix_s = {from_s:.6}");
     }
     list.push_str("frame,t_s\n");
@@ -96,7 +96,7 @@ fn all(
         if over {
             break;
         }
-        let _ = writeln!(list, "{frames},{:.6}", t_s - if live { from_s } else { 0.0 });
+        let _ = writeln!(list, "{frames},{:.6}", t_s - if since_1970 { from_s } else { 0.0 });
         frames += 1;
         progress(frames, most);
     }
