@@ -11,12 +11,29 @@ use super::write::{Column, Groups, Values};
 use crate::fields::{self, MESSAGE};
 use crate::stream::{Record, Sink, StreamError, Truth};
 
+/// Rows that are taken apart together, column by column: one at a time, each would touch some 300 columns' ends.
+const ROWS: usize = 64;
+
+/// What stands in one row.
+#[derive(Default)]
+struct Row {
+    state: Option<Box<RavenState>>,
+    truths: [Option<Truth>; 2],
+}
+
+impl Row {
+    fn is_empty(&self) -> bool {
+        self.state.is_none() && self.truths == [None, None]
+    }
+}
+
 /// A Parquet file of full states being written.
 pub struct StateWriter {
     groups: Groups,
     /// The row that may still get truth.
-    state: Option<Box<RavenState>>,
-    truths: [Option<Truth>; 2],
+    row: Row,
+    /// Those that are complete.
+    rows: Vec<Row>,
 }
 
 impl StateWriter {
@@ -26,20 +43,28 @@ impl StateWriter {
     /// [`StreamError`] where the disk refuses.
     pub fn create(path: &Path, metadata: &[(String, String)]) -> Result<Self, StreamError> {
         let groups = Groups::create(path, state_columns::columns(), STATES_LAYOUT, metadata)?;
-        Ok(Self { groups, state: None, truths: [None, None] })
+        Ok(Self { groups, row: Row::default(), rows: Vec::with_capacity(ROWS) })
     }
 
-    fn row(&mut self) -> Result<(), StreamError> {
-        if self.state.is_none() && self.truths == [None, None] {
-            return Ok(());
+    /// The row at hand is complete.
+    fn row_done(&mut self) -> Result<(), StreamError> {
+        let row = std::mem::take(&mut self.row);
+        if !row.is_empty() {
+            self.rows.push(row);
         }
-        let state = self.state.take();
+        if self.rows.len() >= ROWS { self.take_apart() } else { Ok(()) }
+    }
+
+    fn take_apart(&mut self) -> Result<(), StreamError> {
         let (of_state, of_truth) = self.groups.columns.split_at_mut(state_columns::HEADER.len() + message_numbers());
-        push_state(of_state, state.as_deref());
+        push_states(of_state, &self.rows);
         for (columns, side) in of_truth.chunks_mut(1 + TRUTH_NUMBERS).zip(Side::ALL) {
-            push_truth(columns, self.truths[side.index()].take().as_ref());
+            for row in &self.rows {
+                push_truth(columns, row.truths[side.index()].as_ref());
+            }
         }
-        self.groups.row_done()
+        self.rows.clear();
+        self.groups.rows_done()
     }
 }
 
@@ -47,21 +72,22 @@ impl Sink for StateWriter {
     fn write(&mut self, record: &Record) -> Result<(), StreamError> {
         match record {
             Record::State(state) => {
-                self.row()?;
-                self.state = Some(state.clone());
+                self.row_done()?;
+                self.row.state = Some(state.clone());
             }
             Record::Truth(truth) => {
-                if self.truths[truth.side.index()].is_some() {
-                    self.row()?;
+                if self.row.truths[truth.side.index()].is_some() {
+                    self.row_done()?;
                 }
-                self.truths[truth.side.index()] = Some(*truth);
+                self.row.truths[truth.side.index()] = Some(*truth);
             }
         }
         Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), StreamError> {
-        self.row()?;
+        self.row_done()?;
+        self.take_apart()?;
         self.groups.finish()
     }
 }
@@ -70,32 +96,39 @@ fn message_numbers() -> usize {
     MESSAGE.iter().map(|field| field.count()).sum()
 }
 
-/// Appends a state's cells; empty ones for a row that holds truth only.
-fn push_state(columns: &mut [Column], state: Option<&RavenState>) {
+/// Appends the states' cells; empty ones for a row that holds truth only.
+fn push_states(columns: &mut [Column], rows: &[Row]) {
     for column in &mut *columns {
-        column.cell(state.is_some());
-    }
-    let Some(state) = state else { return };
-    let (header, message) = columns.split_at_mut(state_columns::HEADER.len());
-    for (column, value) in header.iter_mut().zip(state_columns::header(state)) {
-        if let Values::I64(values) = &mut column.values {
-            values.push(value);
+        for row in rows {
+            column.cell(row.state.is_some());
         }
     }
-    let mut columns = message.iter_mut().map(|column| &mut column.values);
+    let (header, mut message) = columns.split_at_mut(state_columns::HEADER.len());
+    let states = || rows.iter().filter_map(|row| row.state.as_deref());
+    for state in states() {
+        for (column, value) in header.iter_mut().zip(state_columns::header(state)) {
+            if let Values::I64(values) = &mut column.values {
+                values.push(value);
+            }
+        }
+    }
     for field in MESSAGE {
-        match (field.get)(state) {
-            fields::Values::Int(numbers) => {
-                for (number, column) in numbers.iter().zip(&mut columns) {
-                    if let Values::I32(values) = column {
-                        values.push(*number);
+        let (of_field, rest) = message.split_at_mut(field.count());
+        message = rest;
+        for state in states() {
+            match (field.get)(state) {
+                fields::Values::Int(numbers) => {
+                    for (number, column) in numbers.iter().zip(&mut *of_field) {
+                        if let Values::I32(values) = &mut column.values {
+                            values.push(*number);
+                        }
                     }
                 }
-            }
-            fields::Values::Float(numbers) => {
-                for (number, column) in numbers.iter().zip(&mut columns) {
-                    if let Values::F32(values) = column {
-                        values.push(*number);
+                fields::Values::Float(numbers) => {
+                    for (number, column) in numbers.iter().zip(&mut *of_field) {
+                        if let Values::F32(values) = &mut column.values {
+                            values.push(*number);
+                        }
                     }
                 }
             }

@@ -45,7 +45,7 @@ impl TableSink for TableWriter {
             }
         }
         // Batches are smaller than row groups: no group grows beyond its bound by more than a batch.
-        self.groups.row_done()
+        self.groups.rows_done()
     }
 
     fn finish(self: Box<Self>) -> Result<(), StreamError> {

@@ -132,8 +132,8 @@ impl Groups {
         Ok(Self { path: path.to_owned(), writer: begun, columns, checksums: Vec::new() })
     }
 
-    /// A row is complete: all columns have as many cells as the first.
-    pub(super) fn row_done(&mut self) -> Result<(), StreamError> {
+    /// Rows are complete: all columns have as many cells as the first.
+    pub(super) fn rows_done(&mut self) -> Result<(), StreamError> {
         if self.columns.first().is_some_and(|column| column.cells >= ROW_GROUP_ROWS) { self.flush() } else { Ok(()) }
     }
 
