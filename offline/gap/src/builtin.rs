@@ -11,7 +11,7 @@ const REACH_S: f64 = 0.012;
 /// The run of the model: its controller along the recorded commands where both are known, else the torque that the model asks
 /// for the recorded motion. None where the recording has neither.
 pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording> {
-    let in_loop = |run: &Run| closed_loop(model, run, ClosedLoop::default()).or_else(|_| given(model, run));
+    let in_loop = |run: Run| closed_loop(model, &run, ClosedLoop::default()).or_else(|_| given(model, run));
     along(model, recording, |run| if model.controller().is_some() { in_loop(run) } else { given(model, run) }).ok()
 }
 
@@ -20,7 +20,7 @@ pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording>
 /// # Errors
 /// What keeps it from being simulated, in one line.
 pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
-    along(model, recording, |run| closed_loop(model, run, ClosedLoop::default()))
+    along(model, recording, |run| closed_loop(model, &run, ClosedLoop::default()))
 }
 
 /// The model driven by the recorded torque, started anew from the recorded state after every `window_s`.
@@ -29,7 +29,11 @@ pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recor
 /// What keeps it from being simulated, in one line.
 pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64) -> Result<Recording, String> {
     let options = OpenLoop { window_s, ..OpenLoop::default() };
-    along(model, recording, |run| open_loop(model, run, options))
+    along(model, recording, |mut run| {
+        // The torque drives it; these would only take memory meanwhile.
+        (run.joints_d, run.true_joints) = (None, None);
+        open_loop(model, &run, options)
+    })
 }
 
 /// The torque that the model asks for the recorded motion, and where its joints and its tip then are.
@@ -43,9 +47,9 @@ pub fn along_motion(model: &RobotModel, recording: &Recording) -> Result<Recordi
 fn along(
     model: &RobotModel,
     recording: &Recording,
-    play: impl FnOnce(&Run) -> Result<Simulated, ResimulateError>,
+    play: impl FnOnce(Run) -> Result<Simulated, ResimulateError>,
 ) -> Result<Recording, String> {
-    let played = run(model, recording).and_then(|run| play(&run));
+    let played = run(model, recording).and_then(play);
     played.map(|simulated| named(model, recording, &simulated)).map_err(|error| error.to_string())
 }
 
@@ -63,7 +67,10 @@ fn named(model: &RobotModel, recording: &Recording, simulated: &Simulated) -> Re
     simulated.to_recording(&format!("{} simulated by {}", recording.name, model.name()), model)
 }
 
-fn given(model: &RobotModel, run: &Run) -> Result<Simulated, ResimulateError> {
+fn given(model: &RobotModel, run: Run) -> Result<Simulated, ResimulateError> {
     let half_width = ((REACH_S / run.period_s()).round() as usize).max(2);
-    inverse(model, &Motion::of_run(run, Given::Motors, half_width)?)
+    let motion = Motion::of_run(&run, Given::Motors, half_width)?;
+    // A run of minutes takes much memory; from here on the motion has all that is needed.
+    drop(run);
+    inverse(model, &motion)
 }

@@ -52,30 +52,32 @@ pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[
         let message = format!("the corrected model was not simulated {what}");
         out.told.push(DataQuality::new(CHECK, Level::Warn, message));
     };
-    let in_loop = if models.0.controller().is_some() {
-        played(models, found, given, band, &along_commands).map_err(|why| told(format!("in the loop: {why}"))).ok()
-    } else {
-        None
-    };
-    let driven = played(models, found, given, band, &|model, recording| along_torque(model, recording, WINDOW_S));
-    // Where the loop says it, a recording without torque needs no line of its own.
-    let driven = driven
-        .map_err(|why| {
-            if in_loop.is_none() {
-                told(format!("with the recorded torque: {why}"));
+    // One way of playing after the other: the runs of each take much memory.
+    let mut in_loop = false;
+    if models.0.controller().is_some() {
+        match played(models, found, given, band, &along_commands) {
+            Ok(played) => {
+                in_loop = true;
+                add_fits(&mut out.fits, found, &|of| in_loop_fit(found, of, &played));
             }
-        })
-        .ok();
-    for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
-        let of = &found.problem.cells[main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients)];
-        if let Some(played) = &in_loop {
-            out.fits[k].extend(in_loop_fit(found, of, played));
-        }
-        if let Some(played) = &driven {
-            out.fits[k].extend(driven_fit(found, of, played));
+            Err(why) => told(format!("in the loop: {why}")),
         }
     }
+    match played(models, found, given, band, &|model, recording| along_torque(model, recording, WINDOW_S)) {
+        Ok(played) => add_fits(&mut out.fits, found, &|of| driven_fit(found, of, &played)),
+        // Where the loop says it, a recording without torque needs no line of its own.
+        Err(why) if !in_loop => told(format!("with the recorded torque: {why}")),
+        Err(_) => {}
+    }
     out
+}
+
+/// One more fit for each effect, where there is one.
+fn add_fits(fits: &mut [Vec<Fit>], found: &Found, fit: &dyn Fn(&Cell) -> Option<Fit>) {
+    for ((effect, estimate), fits) in found.answer.effects.iter().zip(found.estimates).zip(fits) {
+        let cell = main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients);
+        fits.extend(fit(&found.problem.cells[cell]));
+    }
 }
 
 fn played(
