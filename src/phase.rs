@@ -133,10 +133,12 @@ mod tests {
     use super::*;
 
     const PERIOD: i64 = 1_000_000;
+    /// Polling before a state is due: the default, and less.
+    const SPINS: [i64; 2] = [400_000, 200_000];
 
     /// Runs the lock against a controller that publishes at `arrival(k)`; returns how late each of the last half was taken.
-    fn lateness(arrival: impl Fn(i64) -> i64, cycles: i64) -> Vec<i64> {
-        let mut lock = PhaseLock::new(PERIOD, 200_000);
+    fn lateness(spin: i64, arrival: impl Fn(i64) -> i64, cycles: i64) -> Vec<i64> {
+        let mut lock = PhaseLock::new(PERIOD, spin);
         let (mut now, mut taken, mut missed) = (0, -1, false);
         let mut late = Vec::new();
         while taken < cycles {
@@ -174,8 +176,9 @@ mod tests {
 
     #[test]
     fn arrivals_are_met_whatever_their_phase() {
-        for phase in [0, 10_000, 100_000, 240_000, 300_000, 500_000, 700_000, 900_000] {
-            let late = lateness(|k| k * PERIOD + phase + jitter(k, 5_000), 4_000);
+        let phases = [0, 10_000, 100_000, 240_000, 300_000, 500_000, 700_000, 900_000];
+        for (spin, phase) in SPINS.into_iter().flat_map(|spin| phases.map(|phase| (spin, phase))) {
+            let late = lateness(spin, |k| k * PERIOD + phase + jitter(k, 5_000), 4_000);
             assert!(late.len() > 1_990, "phase {phase}: only {} of 2000 taken", late.len());
             assert!(late[late.len() - 1] < 1_000, "phase {phase}: {} ns late", late[late.len() - 1]);
         }
@@ -183,18 +186,24 @@ mod tests {
 
     #[test]
     fn one_late_arrival_costs_nothing_but_itself() {
-        for delay in [150_000, 300_000, 500_000, 700_000, 900_000] {
-            let late = lateness(|k| k * PERIOD + jitter(k, 5_000) + if k % 50 == 0 { delay } else { 0 }, 4_000);
+        let delays = [150_000, 300_000, 500_000, 700_000, 900_000];
+        for (spin, delay) in SPINS.into_iter().flat_map(|spin| delays.map(|delay| (spin, delay))) {
+            let late = lateness(spin, |k| k * PERIOD + jitter(k, 5_000) + if k % 50 == 0 { delay } else { 0 }, 4_000);
             let odd = late.iter().filter(|late| **late > 1_000).count();
             // Later than the polling lasts: that one waits for the next look, no other does.
-            assert!(odd <= if delay > 550_000 { 41 } else { 0 }, "delay {delay}: {odd} of {} taken late", late.len());
+            assert!(
+                odd <= if delay > PERIOD * 3 / 4 - spin { 41 } else { 0 },
+                "spin {spin}, delay {delay}: {odd} of {} taken late",
+                late.len()
+            );
         }
     }
 
     #[test]
     fn a_controller_that_moves_its_phase_is_followed() {
-        for shift in [50_000, 200_000, 400_000, 600_000, 800_000] {
-            let late = lateness(|k| k * PERIOD + jitter(k, 5_000) + if k > 3_000 { shift } else { 0 }, 4_000);
+        let shifts = [50_000, 200_000, 400_000, 600_000, 800_000];
+        for (spin, shift) in SPINS.into_iter().flat_map(|spin| shifts.map(|shift| (spin, shift))) {
+            let late = lateness(spin, |k| k * PERIOD + jitter(k, 5_000) + if k > 3_000 { shift } else { 0 }, 4_000);
             let odd = late.iter().filter(|late| **late > 1_000).count();
             assert!(odd <= 12, "shift {shift}: {odd} taken late");
         }
@@ -202,8 +211,9 @@ mod tests {
 
     #[test]
     fn a_controller_whose_period_is_a_little_off_is_followed() {
-        for drift in [-500, -20, 20, 500] {
-            let late = lateness(|k| k * (PERIOD + drift) + jitter(k, 5_000), 4_000);
+        let drifts = [-500, -20, 20, 500];
+        for (spin, drift) in SPINS.into_iter().flat_map(|spin| drifts.map(|drift| (spin, drift))) {
+            let late = lateness(spin, |k| k * (PERIOD + drift) + jitter(k, 5_000), 4_000);
             assert!(late[late.len() - 1] < 1_000, "drift {drift}: {} ns late", late[late.len() - 1]);
         }
     }

@@ -288,9 +288,8 @@ impl<E: Estimator> Runner<E> {
         while !self.waiting_state() && now_ns() < deadline_ns {
             if self.waiting.keep_warm {
                 self.cycle.keep_warm();
-            } else {
-                std::hint::spin_loop();
             }
+            std::hint::spin_loop();
         }
     }
 

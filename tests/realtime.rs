@@ -141,6 +141,10 @@ fn million() -> ! {
                 sequence += 1;
                 writer.send(&faulty(sequence)).expect("state sent");
                 runner.turn();
+                if sequence % 1000 == 0 {
+                    // Nothing comes: a period of polling, and of keeping the weights warm.
+                    runner.turn();
+                }
                 while let Some(pose) = reader.next().expect("pose read") {
                     if pose.arm[0].status == ArmStatus::Valid as u32 {
                         VALID.fetch_add(1, SeqCst);

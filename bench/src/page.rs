@@ -9,7 +9,7 @@ const PAGE: &str = "# Performance
 
 Written by `make bench` (`ravenpose-bench full --write`), every table of it in one run of one machine. Such machines are shared and noisy:
 compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `sleep`, `spin`,
-`event`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
+`event`, `means`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
 
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.

@@ -339,6 +339,9 @@ fn run(seed: u64, count: u64) -> Checker {
             }
         }
         let wake = world.now + world.rng.below(200_000) as i64;
+        for _ in 0..world.rng.below(3) {
+            cycle.keep_warm();
+        }
         for message in std::mem::take(&mut world.pending) {
             cycle.offer(&message, wake);
             world.offered += 1;

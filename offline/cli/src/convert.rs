@@ -76,6 +76,14 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
         return Err(format!("{}: {why}; nothing was written", input.display()));
     }
     sink.finish().map_err(|error| error.to_string())?;
+    for channel in source.channels().iter().filter(|channel| !channel.is_read && channel.messages > 0) {
+        say!(
+            "note: {} messages on {} ({}) are not in it: states and truth are converted",
+            channel.messages,
+            channel.topic,
+            channel.type_name
+        );
+    }
     say!("{}: {records} records", out.display());
     Ok(source.damage().cloned())
 }

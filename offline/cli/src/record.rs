@@ -5,6 +5,7 @@
 //! written stands as `NAME.part` until the end: a kill leaves all but the last second there.
 
 use crate::webcams::{self, Image, Webcams};
+use crossbeam_queue::ArrayQueue;
 use ravenpose::{realtime, signals};
 use ravenpose_transport::{Reader, Settings};
 use ravenpose_wire::{ArmPose, CorrectedPose, RavenState};
@@ -14,13 +15,15 @@ use recordings::stream::{Record, Sink};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Most messages that a link keeps for a reader: 64 ms at 1 kHz.
 const DEPTH: usize = 64;
-/// Messages that may wait for the disk: eight seconds of both streams.
-const WAITING_MAX: usize = 16_384;
+/// Messages of each stream that may wait for the disk: eight seconds.
+const WAITING_MAX: usize = 8192;
+/// The writing thread looks that often.
+const PAUSE: Duration = Duration::from_millis(5);
 /// Below RAVEN's controller (90) and the service (80).
 const PRIORITY: i32 = 20;
 /// Messages lost before the recorder heard them.
@@ -56,13 +59,13 @@ impl Clock {
     }
 }
 
-/// What the threads hand over, with its time in ns since 1970.
-enum Heard {
-    State(u64, Box<RavenState>),
-    Pose(u64, Box<CorrectedPose>),
-    Image(Image),
-    /// Nothing follows that is waited for: a camera that hangs may hold on to its end of the channel.
-    End,
+/// What the listening thread hands over, with times in ns since 1970. Without locks or allocation: an ordinary thread that holds a lock
+/// on a busy machine would make the listener wait for longer than the link keeps messages.
+struct Heard {
+    states: ArrayQueue<(u64, RavenState)>,
+    poses: ArrayQueue<(u64, CorrectedPose)>,
+    /// Nothing more will come.
+    ended: AtomicBool,
 }
 
 /// What was heard and what was missed.
@@ -107,10 +110,9 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
     }
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
     let clock = Clock::start();
-    let (sender, receiver) = sync_channel(WAITING_MAX);
-    // Cameras wait for room where the listener may not; too few images are let in to fill the channel.
-    let (images, ending) = (sender.clone(), sender.clone());
-    let webcams = Webcams::open(cameras, clock, &move |image| drop(images.send(Heard::Image(image))))?;
+    let (images, arrived) = sync_channel(webcams::WAITING_MAX);
+    // A writer that has failed is gone.
+    let webcams = Webcams::open(cameras, clock, &move |image| drop(images.send(image)))?;
     let metadata = [("recorder", "ravenpose record"), ("clock", "wall clock at the start plus CLOCK_MONOTONIC since")];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let mut log = McapLog::create(out, &metadata).map_err(|error| error.to_string())?;
@@ -120,15 +122,14 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
         let channel = log.add_channel(&camera_topic(&webcam.name), &COMPRESSED_IMAGE).map_err(|error| error.to_string())?;
         channels.push((webcam.name.clone(), channel));
     }
+    let heard = Heard { states: ArrayQueue::new(WAITING_MAX), poses: ArrayQueue::new(WAITING_MAX), ended: AtomicBool::new(false) };
     let stop = AtomicBool::new(false);
     say!("recording to {}; Ctrl-C ends it", log.part().display());
     let begun = Instant::now();
-    let (tally, written) = std::thread::scope(|scope| {
-        let listening = scope.spawn({
-            let stop = &stop;
-            move || listen(&sender, clock, stop)
-        });
-        let writing = scope.spawn(move || write(log, poses, &channels, &receiver));
+    let (tally, written, cameras) = std::thread::scope(|scope| {
+        let (heard, stop, channels) = (&heard, &stop, &channels);
+        let listening = scope.spawn(move || listen(heard, clock, stop));
+        let writing = scope.spawn(move || write(log, (poses, channels), heard, &arrived));
         webcams.begin();
         while seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds)
             && !listening.is_finished()
@@ -138,12 +139,11 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
                 break;
             }
         }
-        webcams.stop();
+        let cameras = webcams.stop();
         stop.store(true, Ordering::Relaxed);
-        let heard = listening.join();
-        // A writer that has failed is gone.
-        drop(ending.send(Heard::End));
-        (heard, writing.join())
+        let tally = listening.join();
+        heard.ended.store(true, Ordering::Release);
+        (tally, writing.join(), cameras)
     });
     let (Ok(tally), Ok(written)) = (tally, written) else { return Err("a thread of the recorder failed".to_owned()) };
     written?;
@@ -158,16 +158,16 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
         tally.lost_poses
     );
     let mut whole = tally.lost_states + tally.lost_poses == 0;
-    for (name, camera) in webcams.outcomes() {
+    for (name, camera) in cameras {
         let fault = camera.fault.as_ref().map_or_else(String::new, |fault| format!("; ended early: {fault}"));
         let gap_ms = camera.longest_gap_ns / 1_000_000;
-        say!("  {name}: {} images, {} missed, {gap_ms} ms at most between two{fault}", camera.images, camera.missed);
+        say!("  {name}: {} images, {} missed, {gap_ms} ms at most without one{fault}", camera.images, camera.missed);
         whole &= camera.missed == 0 && camera.fault.is_none();
     }
     Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(LOST) })
 }
 
-fn listen(sender: &SyncSender<Heard>, clock: Clock, stop: &AtomicBool) -> Result<Tally, String> {
+fn listen(heard: &Heard, clock: Clock, stop: &AtomicBool) -> Result<Tally, String> {
     // Without the right it listens all the same; 64 ms of patience are usually enough.
     if let Err(missing) = realtime::set_fifo(PRIORITY) {
         say!("note: no real-time priority for the recorder ({missing}); messages may be missed on a busy machine");
@@ -181,14 +181,14 @@ fn listen(sender: &SyncSender<Heard>, clock: Clock, stop: &AtomicBool) -> Result
         let taken = states.drain(|state| {
             if state.admit().is_ok() {
                 tally.state(state);
-                full |= sender.try_send(Heard::State(clock.stamp(state.source_time_ns), Box::new(*state))).is_err();
+                full |= heard.states.push((clock.stamp(state.source_time_ns), *state)).is_err();
             }
         });
         taken.map_err(|error| error.to_string())?;
         let taken = poses.drain(|pose| {
             if pose.admit().is_ok() {
                 tally.pose(pose);
-                full |= sender.try_send(Heard::Pose(clock.stamp(pose.publish_time_ns), Box::new(*pose))).is_err();
+                full |= heard.poses.push((clock.stamp(pose.publish_time_ns), *pose)).is_err();
             }
         });
         taken.map_err(|error| error.to_string())?;
@@ -200,27 +200,37 @@ fn listen(sender: &SyncSender<Heard>, clock: Clock, stop: &AtomicBool) -> Result
     Ok(tally)
 }
 
-fn write(mut log: McapLog, poses: LogChannel, cameras: &[(String, LogChannel)], receiver: &Receiver<Heard>) -> Result<(), String> {
+fn write(
+    mut log: McapLog,
+    (poses, cameras): (LogChannel, &[(String, LogChannel)]),
+    heard: &Heard,
+    arrived: &Receiver<Image>,
+) -> Result<(), String> {
     let mut bytes = Vec::new();
     let failed = |error: recordings::stream::StreamError| error.to_string();
     loop {
-        match receiver.recv_timeout(Duration::from_millis(200)) {
-            Ok(Heard::State(time_ns, state)) => log.write_at(&Record::State(state), time_ns).map_err(failed)?,
-            Ok(Heard::Pose(time_ns, pose)) => {
-                encode(&pose, &mut bytes);
-                log.write_message(poses, time_ns, pose.sequence as u32, &bytes).map_err(failed)?;
-            }
-            Ok(Heard::Image(image)) => {
-                let Some((name, channel)) = cameras.get(image.camera) else { continue };
-                bytes.clear();
-                let Image { time_ns, number, jpeg, waiting, .. } = image;
-                CompressedImage { header: Header::at(number, time_ns), data: jpeg }.encode(name, &mut bytes);
-                log.write_message(*channel, time_ns, number, &bytes).map_err(failed)?;
-                drop(waiting);
-            }
-            Err(RecvTimeoutError::Timeout) => log.tick().map_err(failed)?,
-            Ok(Heard::End) | Err(RecvTimeoutError::Disconnected) => return Box::new(log).finish().map_err(failed),
+        // Asked first: what came before the end is then found below.
+        let ended = heard.ended.load(Ordering::Acquire);
+        while let Some((time_ns, state)) = heard.states.pop() {
+            log.write_at(&Record::State(Box::new(state)), time_ns).map_err(failed)?;
         }
+        while let Some((time_ns, pose)) = heard.poses.pop() {
+            encode(&pose, &mut bytes);
+            log.write_message(poses, time_ns, pose.sequence as u32, &bytes).map_err(failed)?;
+        }
+        // A camera that hangs may hold on to its end of the channel for ever.
+        for Image { camera, time_ns, number, jpeg, waiting } in arrived.try_iter() {
+            let Some((name, channel)) = cameras.get(camera) else { continue };
+            bytes.clear();
+            CompressedImage { header: Header::at(number, time_ns), data: jpeg }.encode(name, &mut bytes);
+            log.write_message(*channel, time_ns, number, &bytes).map_err(failed)?;
+            drop(waiting);
+        }
+        if ended {
+            return Box::new(log).finish().map_err(failed);
+        }
+        log.tick().map_err(failed)?;
+        std::thread::sleep(PAUSE);
     }
 }
 

@@ -9,6 +9,8 @@ use ::vision::video::{self, Shot, Source};
 use clap::Subcommand;
 use recordings::mcap_file::ImageSource;
 use recordings::stream::StreamError;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -170,16 +172,24 @@ fn tracked_words(tracked: &Tracked) -> String {
     lines.join("\n") + "\n"
 }
 
+/// What a file is, its first bytes say: the recording may be one that was cut off, RUN.mcap.part. A device is not read for that.
+fn is_mcap(path: &Path) -> bool {
+    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+    let mut start = [0; MAGIC.len()];
+    path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *MAGIC
+}
+
 /// A camera's images in a recording of `ravenpose record`.
 struct Recorded {
     path: PathBuf,
     images: ImageSource,
+    ended: bool,
 }
 
 impl Recorded {
     fn open(path: &Path, camera: &str) -> Result<Self, String> {
         let images = ImageSource::open(path, camera).map_err(|error| error.to_string())?;
-        Ok(Self { path: path.to_owned(), images })
+        Ok(Self { path: path.to_owned(), images, ended: false })
     }
 }
 
@@ -189,6 +199,12 @@ impl Source for Recorded {
             let StreamError { what, remedy, .. } = error;
             ::vision::Error::content(&self.path, "images", what, remedy)
         })?;
+        if image.is_none() && !self.ended {
+            self.ended = true;
+            if let Some(damage) = self.images.damage() {
+                complain!("{}: {}: {}; images before it are there", self.path.display(), damage.place, damage.what);
+            }
+        }
         Ok(image.map(|image| Shot { t_s: image.time_ns as f64 / 1e9, jpeg: image.jpeg }))
     }
 
@@ -217,7 +233,7 @@ fn record(
         if opened[index].is_some() {
             return Err(format!("{source}: camera {name} has a source already; give each camera one"));
         }
-        let own = if Path::new(path).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
+        let own = if is_mcap(Path::new(path)) {
             Box::new(Recorded::open(Path::new(path), name)?)
         } else {
             video::open(Path::new(path), ffmpeg, rig.size_px, frames_per_s).map_err(|error| error.to_string())?

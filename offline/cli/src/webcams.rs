@@ -2,14 +2,14 @@
 
 use super::record::Clock;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use vision::video;
 
 /// Images that may wait for the disk, of all cameras: some 50 MB.
-const WAITING_MAX: usize = 256;
+pub(crate) const WAITING_MAX: usize = 256;
 /// A camera that has not begun by then is not there.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -51,27 +51,41 @@ impl Drop for Waiting {
     }
 }
 
-/// What became of a camera.
-#[derive(Default)]
+/// What became of a camera so far.
+#[derive(Default, Clone)]
 pub(crate) struct Outcome {
     pub images: u32,
     /// Those that came while too many waited for the disk.
     pub missed: u32,
-    /// Longest time between two images, or before the first, ns.
+    /// Longest time without an image, from the beginning of the recording to its end, ns.
     pub longest_gap_ns: u64,
     /// Why it ended before the recording did.
     pub fault: Option<String>,
+    last_ns: u64,
+}
+
+impl Outcome {
+    fn nothing_until(&mut self, time_ns: u64) {
+        self.longest_gap_ns = self.longest_gap_ns.max(time_ns.saturating_sub(self.last_ns));
+        self.last_ns = time_ns;
+    }
 }
 
 /// A camera that is open.
 pub(crate) struct Webcam {
     pub name: String,
-    outcome: Receiver<Outcome>,
+    outcome: Arc<Mutex<Outcome>>,
+}
+
+/// Whoever holds the lock only counts: what a thread that died left behind is whole.
+fn locked(outcome: &Mutex<Outcome>) -> MutexGuard<'_, Outcome> {
+    outcome.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// All webcams of a recording, running.
 pub(crate) struct Webcams {
     pub all: Vec<Webcam>,
+    clock: Clock,
     begin: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
 }
@@ -107,13 +121,20 @@ impl Webcams {
             .enumerate()
             .map(|(camera, (name, path))| {
                 let (opened, is_open) = sync_channel(1);
-                let (ended, outcome) = sync_channel(1);
+                let outcome = Arc::default();
                 let (ffmpeg, frames_per_s) = (wish.ffmpeg.clone(), wish.frames_per_s);
-                let thread =
-                    Thread { camera, clock, begin: Arc::clone(&begin), stop: Arc::clone(&stop), waiting: Arc::clone(&waiting) };
+                let thread = Thread {
+                    camera,
+                    name: name.clone(),
+                    clock,
+                    begin: Arc::clone(&begin),
+                    stop: Arc::clone(&stop),
+                    waiting: Arc::clone(&waiting),
+                    outcome: Arc::clone(&outcome),
+                };
                 let send = send.clone();
                 // On its own: a camera that hangs holds nobody up.
-                std::thread::spawn(move || thread.run(&path, &ffmpeg, size_px, frames_per_s, &opened, &ended, &send));
+                std::thread::spawn(move || thread.run(&path, &ffmpeg, size_px, frames_per_s, &opened, &send));
                 (name, is_open, outcome)
             })
             .collect();
@@ -127,27 +148,28 @@ impl Webcams {
                 }
             }
         }
-        Ok(Self { all, begin, stop })
+        Ok(Self { all, clock, begin, stop })
     }
 
     /// From now on images are handed over.
     pub(crate) fn begin(&self) {
+        let now_ns = self.clock.stamp(ravenpose_transport::now_ns());
+        for webcam in &self.all {
+            locked(&webcam.outcome).last_ns = now_ns;
+        }
         self.begin.store(true, Ordering::Relaxed);
     }
 
-    /// Tells them to end; [`Webcams::outcomes`] then waits for it. Images handed over so far are with the disk.
-    pub(crate) fn stop(&self) {
+    /// Tells them to end, and what became of each until now, by name. One that hangs is not waited for.
+    pub(crate) fn stop(&self) -> Vec<(String, Outcome)> {
         self.stop.store(true, Ordering::Relaxed);
-    }
-
-    /// What became of each, by name.
-    pub(crate) fn outcomes(self) -> Vec<(String, Outcome)> {
-        let hung = || Outcome { fault: Some("it hangs".to_owned()), ..Outcome::default() };
-        let one = |webcam: Webcam| {
-            let outcome = webcam.outcome.recv_timeout(Duration::from_secs(2)).unwrap_or_else(|_| hung());
-            (webcam.name, outcome)
+        let now_ns = self.clock.stamp(ravenpose_transport::now_ns());
+        let one = |webcam: &Webcam| {
+            let mut outcome = locked(&webcam.outcome);
+            outcome.nothing_until(now_ns);
+            (webcam.name.clone(), outcome.clone())
         };
-        self.all.into_iter().map(one).collect()
+        self.all.iter().map(one).collect()
     }
 }
 
@@ -161,14 +183,15 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 
 struct Thread {
     camera: usize,
+    name: String,
     clock: Clock,
     begin: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
     waiting: Arc<AtomicUsize>,
+    outcome: Arc<Mutex<Outcome>>,
 }
 
 impl Thread {
-    #[expect(clippy::too_many_arguments, reason = "the start of a thread")]
     fn run(
         &self,
         path: &Path,
@@ -176,7 +199,6 @@ impl Thread {
         size_px: [u32; 2],
         frames_per_s: f64,
         opened: &SyncSender<Result<(), String>>,
-        ended: &SyncSender<Outcome>,
         send: &impl Fn(Image),
     ) {
         let source = video::open(path, ffmpeg, size_px, frames_per_s).map_err(|error| error.to_string());
@@ -188,45 +210,38 @@ impl Thread {
         if opened.send(said).is_err() {
             return;
         }
-        if let Some(source) = source {
-            // As above: the recording may have ended without this one.
-            drop(ended.send(self.watch(source, send)));
-        }
+        let Some(fault) = source.and_then(|source| self.watch(source, send)) else { return };
+        complain!("camera {}: {fault}; the recording goes on without it", self.name);
+        locked(&self.outcome).fault = Some(fault);
     }
 
-    fn watch(&self, mut source: Box<dyn video::Source>, send: &impl Fn(Image)) -> Outcome {
-        let mut outcome = Outcome::default();
-        let mut last_ns = None;
+    /// Hands images over until it is told to stop; why it ended before, if it did.
+    fn watch(&self, mut source: Box<dyn video::Source>, send: &impl Fn(Image)) -> Option<String> {
         loop {
             let next = source.next();
             let time_ns = self.clock.stamp(ravenpose_transport::now_ns());
+            // Held until the image is handed over: what is counted at the end is with the writer by then.
+            let mut outcome = locked(&self.outcome);
             if self.stop.load(Ordering::Relaxed) {
-                return outcome;
+                return None;
             }
             let shot = match next {
                 Ok(Some(shot)) => shot,
-                Ok(None) => {
-                    outcome.fault = Some("it ended by itself".to_owned());
-                    return outcome;
-                }
-                Err(error) => {
-                    outcome.fault = Some(error.to_string());
-                    return outcome;
-                }
+                Ok(None) => return Some(source.last_words().unwrap_or_else(|| "it ended by itself".to_owned())),
+                Err(error) => return Some(error.to_string()),
             };
             if !self.begin.load(Ordering::Relaxed) {
                 continue;
             }
-            outcome.longest_gap_ns = outcome.longest_gap_ns.max(time_ns.saturating_sub(*last_ns.get_or_insert(time_ns)));
-            last_ns = Some(time_ns);
+            outcome.nothing_until(time_ns);
             if self.waiting.fetch_add(1, Ordering::Relaxed) >= WAITING_MAX {
                 self.waiting.fetch_sub(1, Ordering::Relaxed);
                 outcome.missed += 1;
                 continue;
             }
             outcome.images += 1;
-            let waiting = Waiting(Arc::clone(&self.waiting));
-            send(Image { camera: self.camera, time_ns, number: outcome.images, jpeg: shot.jpeg, waiting });
+            let (camera, number, waiting) = (self.camera, outcome.images, Waiting(Arc::clone(&self.waiting)));
+            send(Image { camera, time_ns, number, jpeg: shot.jpeg, waiting });
         }
     }
 }

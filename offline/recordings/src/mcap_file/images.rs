@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::reader::McapSource;
 use crate::ros::{COMPRESSED_IMAGE, camera_topic};
-use crate::stream::{Source, StreamError};
+use crate::stream::{Damage, Source, StreamError};
 
 /// An image and when it came.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,6 +33,11 @@ impl ImageSource {
         Ok(Self { file, camera: camera.to_owned(), found: false })
     }
 
+    /// Where the file is damaged, once its images have come to an end.
+    pub fn damage(&self) -> Option<&Damage> {
+        self.file.damage()
+    }
+
     /// The next image; `None` at the end, or where damage begins.
     ///
     /// # Errors
@@ -40,8 +45,13 @@ impl ImageSource {
     pub fn next_image(&mut self) -> Result<Option<StampedImage>, StreamError> {
         let image = self.file.next_image()?;
         if image.is_none() && !self.found {
-            let topics: Vec<String> =
-                self.file.channels().into_iter().filter(|c| c.type_name == COMPRESSED_IMAGE.name).map(|c| c.topic).collect();
+            let topics: Vec<String> = self
+                .file
+                .channels()
+                .into_iter()
+                .filter(|c| c.type_name == COMPRESSED_IMAGE.name && c.messages > 0)
+                .map(|c| c.topic)
+                .collect();
             let there = if topics.is_empty() { "no images".to_owned() } else { topics.join(", ") };
             return Err(StreamError {
                 file: self.file.path().to_owned(),

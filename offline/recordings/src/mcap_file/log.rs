@@ -142,7 +142,7 @@ fn occupied(part: &Path, error: std::io::Error) -> StreamError {
         file: part.to_owned(),
         place: None,
         what: "is there already, from a run that did not end".to_owned(),
-        remedy: "keep it with `ravenpose convert`, or remove it".to_owned(),
+        remedy: "give it another name to keep it, or remove it".to_owned(),
     }
 }
 

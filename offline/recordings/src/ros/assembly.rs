@@ -41,6 +41,11 @@ impl Role {
         if type_name == RAVEN_STATE.name {
             return StateDecoder::of_definition(definition).map(|decoder| Some(Self::State(decoder)));
         }
+        if type_name == COMPRESSED_IMAGE.name {
+            // Another definition of it is somebody else's: no reason to refuse the states.
+            let ours = compare(type_name, definition, COMPRESSED_IMAGE.definition).is_ok();
+            return Ok(ours.then(|| Self::Image(topic.to_owned())));
+        }
         let Some((known, role)) = Self::known(topic, type_name) else { return Ok(None) };
         if definition != known.definition {
             compare(type_name, definition, known.definition)?;
@@ -54,9 +59,6 @@ impl Role {
         }
         if type_name == KEY_VALUE.name && topic == METADATA_TOPIC.name {
             return Some((KEY_VALUE, Self::Metadata));
-        }
-        if type_name == COMPRESSED_IMAGE.name {
-            return Some((COMPRESSED_IMAGE, Self::Image(topic.to_owned())));
         }
         if type_name == JOINT_STATE.name && topic == EXTERNAL_JOINTS {
             return Some((JOINT_STATE, Self::ExternalJoints));

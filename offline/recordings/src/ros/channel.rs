@@ -41,7 +41,9 @@ impl KnownChannel {
             what: format!("the definition of {type_name} on {topic} {error}"),
             remedy: "record with a message that has all fields of raven_2/raven_state",
         })?;
-        let shown = Channel { topic, type_name, encoding: "ros1".to_owned(), messages: 0, is_read: role.is_some() };
+        // Images are read by those who ask for them, never as records.
+        let is_read = role.as_ref().is_some_and(|role| !matches!(role, Role::Image(_)));
+        let shown = Channel { topic, type_name, encoding: "ros1".to_owned(), messages: 0, is_read };
         Ok(Self { shown, role })
     }
 

@@ -3,14 +3,16 @@
 use super::avi::Avi;
 use super::{Shot, Source};
 use crate::error::{Error, Result};
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 struct Piped {
     path: PathBuf,
     child: Child,
+    words: Words,
     avi: Avi<BufReader<ChildStdout>>,
     live: bool,
     shots: u64,
@@ -43,23 +45,41 @@ fn start(path: &Path, program: &Path, arguments: &[&str], live: bool) -> Result<
     let Some(output) = child.stdout.take() else {
         return Err(Error::content(path, "video", "no pipe from ffmpeg", "try again"));
     };
+    let mut words = Words::of(child.stderr.take());
     match Avi::open(path, BufReader::new(output)) {
-        Ok(avi) => Ok(Box::new(Piped { path: path.to_owned(), child, avi, live, shots: 0 })),
-        Err(_) => Err(fault(path, &mut child)),
+        Ok(avi) => Ok(Box::new(Piped { path: path.to_owned(), child, words, avi, live, shots: 0 })),
+        Err(_) => Err(fault(path, &mut child, &mut words)),
+    }
+}
+
+/// What the program says, read all the time: a full pipe would stop it.
+struct Words(Option<JoinHandle<String>>);
+
+impl Words {
+    fn of(stderr: Option<ChildStderr>) -> Self {
+        let last_line = move |stderr: ChildStderr| {
+            let mut last = String::new();
+            for line in BufReader::new(stderr).split(b'\n').map_while(std::result::Result::ok) {
+                let line = String::from_utf8_lossy(&line).trim().to_owned();
+                last = if line.is_empty() { last } else { line };
+            }
+            last
+        };
+        Self(stderr.map(|stderr| std::thread::spawn(move || last_line(stderr))))
+    }
+
+    /// The last line, once the program has ended.
+    fn last(&mut self) -> Option<String> {
+        self.0.take()?.join().ok().filter(|line| !line.is_empty())
     }
 }
 
 /// What the program said, in one line.
-fn fault(path: &Path, child: &mut Child) -> Error {
+fn fault(path: &Path, child: &mut Child, words: &mut Words) -> Error {
     // It may still run if what it sent was no video.
     drop(child.kill());
-    let mut text = String::new();
-    if let Some(mut stderr) = child.stderr.take() {
-        // Words that cannot be read are not said.
-        drop(stderr.read_to_string(&mut text));
-    }
     drop(child.wait());
-    let said = text.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("nothing came").to_owned();
+    let said = words.last().unwrap_or_else(|| "nothing came".to_owned());
     Error::content(path, "ffmpeg", said, "check that it is a video, or a camera that nobody else uses")
 }
 
@@ -74,13 +94,19 @@ impl Source for Piped {
                 }
                 Ok(Some(shot))
             }
-            None if self.shots == 0 => Err(fault(&self.path, &mut self.child)),
+            None if self.shots == 0 => Err(fault(&self.path, &mut self.child, &mut self.words)),
             None => Ok(None),
         }
     }
 
     fn live(&self) -> bool {
         self.live
+    }
+
+    fn last_words(&mut self) -> Option<String> {
+        drop(self.child.kill());
+        drop(self.child.wait());
+        self.words.last()
     }
 }
 

@@ -34,6 +34,11 @@ pub trait Source: Send {
         false
     }
 
+    /// What it said before it came to an end, if anything. It is over then.
+    fn last_words(&mut self) -> Option<String> {
+        None
+    }
+
     /// Are its times since 1970, by a clock that other sources share? Those of live ones are.
     fn since_1970(&self) -> bool {
         self.live()

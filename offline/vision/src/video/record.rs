@@ -59,6 +59,8 @@ fn all(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Recorded> {
+    // Of a recording, a camera may have failed long before the others; videos that somebody chose end together.
+    let until_last = sources.iter().flatten().all(|source| source.since_1970() && !source.live());
     let since_1970 = sources.iter().flatten().any(|source| source.since_1970());
     let mut tracks: Vec<Option<Track>> = sources.into_iter().map(|source| source.map(Track::start)).collect();
     for (camera, _) in rig.cameras.iter().zip(&tracks).filter(|(_, track)| track.is_some()) {
@@ -81,11 +83,11 @@ fn all(
     let mut frames = 0;
     while most == 0 || frames < most {
         let t_s = from_s + frames as f64 * step_s;
-        let mut over = false;
+        let mut over = until_last;
         for (index, track) in tracks.iter_mut().enumerate() {
             let Some(track) = track else { continue };
             let (shot, ended) = track.nearest(t_s, 0.5 * step_s)?;
-            over |= ended;
+            over = if until_last { over && ended } else { over || ended };
             let Some(shot) = shot else { continue };
             let name = &rig.cameras[index].name;
             let file = out.join("frames").join(name).join(format!("{frames:06}.jpg"));
