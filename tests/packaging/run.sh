@@ -51,9 +51,9 @@ runtime_dir = "$work/run"
 END
   "$stage/bin/ravenposed" --config "$work/c.toml" & service=$!
   for _ in $(seq 1 100); do [ -f "$work/run/stats.json" ] && break; sleep 0.05; done
-  "$work/reader" 1500 > "$work/read" & reader=$!
+  "$work/reader" 3500 > "$work/read" & reader=$!
   sleep 0.3
-  "$work/publisher" 1000 || return 1
+  "$work/publisher" 3000 || return 1
   wait $reader; cat "$work/read"
   kill -TERM $service; wait $service || return 1
   grep -q ', corrected, flags' "$work/read"
