@@ -193,10 +193,9 @@ impl<E: Estimator> Runner<E> {
     /// One cycle: wait, take the newest state, answer it, publish, record.
     pub fn turn(&mut self) {
         let waited = self.wait();
-        let start_ns = now_ns();
-        let mut laps = Laps { last_ns: start_ns, features_ns: 0, inference_ns: 0 };
         let accepted = self.cycle.counters().accepted;
-        self.take(start_ns);
+        let start_ns = self.take();
+        let mut laps = Laps { last_ns: start_ns, features_ns: 0, inference_ns: 0 };
         let fresh = self.cycle.counters().accepted != accepted;
         self.learn(fresh, waited, start_ns);
         if self.cycle.step(start_ns, &mut laps, &mut self.pose) {
@@ -297,13 +296,19 @@ impl<E: Estimator> Runner<E> {
         self.link.as_ref().is_some_and(|link| link.reader.has_message())
     }
 
-    fn take(&mut self, now_ns: i64) {
+    /// Takes what waits; returns when the newest was taken, or now if nothing was.
+    ///
+    /// The clock is read after each message: read before, a message that comes while this thread is held up would be from the future.
+    fn take(&mut self) -> i64 {
         let cycle = &mut self.cycle;
+        let mut taken_ns = None;
+        let take = |state: &RavenState| cycle.offer(state, *taken_ns.insert(now_ns()));
         if let Some(link) = &self.link
-            && link.reader.drain(|state| cycle.offer(state, now_ns)).is_err()
+            && link.reader.drain(take).is_err()
         {
             self.link_counters.receive_failures += 1;
         }
+        taken_ns.unwrap_or_else(now_ns)
     }
 
     fn send(&mut self) {
@@ -326,8 +331,7 @@ impl<E: Estimator> Runner<E> {
 
     /// The last message: flagged `stopping`, correction zero.
     fn stop(&mut self) {
-        let now = now_ns();
-        self.take(now);
+        let now = self.take();
         if self.cycle.stop(now, &mut self.pose) {
             self.send();
         }

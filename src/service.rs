@@ -18,10 +18,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Longest wait for the loop to send its last message.
-const STOP_MAX: Duration = Duration::from_millis(100);
+/// Longest wait for the loop to send its last message: 100 ms, in ticks of this thread, so that a stop of the whole process does not
+/// count.
+const STOP_TICKS: u32 = 100;
+const STOP_TICK: Duration = Duration::from_millis(1);
 
 const USAGE: &str = "\
 ravenposed - corrects the end-effector position of a RAVEN-II in hard real time
@@ -224,9 +226,11 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
     }
     notify(&[NotifyState::Stopping]);
     watch.shared.stop.store(true, Relaxed);
-    let asked = Instant::now();
-    while !handle.is_finished() && asked.elapsed() < STOP_MAX {
-        std::thread::sleep(Duration::from_millis(1));
+    for _ in 0..STOP_TICKS {
+        if handle.is_finished() {
+            break;
+        }
+        std::thread::sleep(STOP_TICK);
     }
     let last = if handle.is_finished() { handle.join().ok().and_then(Result::ok) } else { None };
     let stopped = last.is_some();
