@@ -136,6 +136,11 @@ mod tests {
     /// Polling before a state is due: the default, and less.
     const SPINS: [i64; 2] = [400_000, 200_000];
 
+    /// Each time of polling with each of these.
+    fn with_spins<const N: usize>(cases: [i64; N]) -> impl Iterator<Item = (i64, i64)> {
+        SPINS.into_iter().flat_map(move |spin| cases.map(|case| (spin, case)))
+    }
+
     /// Runs the lock against a controller that publishes at `arrival(k)`; returns how late each of the last half was taken.
     fn lateness(spin: i64, arrival: impl Fn(i64) -> i64, cycles: i64) -> Vec<i64> {
         let mut lock = PhaseLock::new(PERIOD, spin);
@@ -177,7 +182,7 @@ mod tests {
     #[test]
     fn arrivals_are_met_whatever_their_phase() {
         let phases = [0, 10_000, 100_000, 240_000, 300_000, 500_000, 700_000, 900_000];
-        for (spin, phase) in SPINS.into_iter().flat_map(|spin| phases.map(|phase| (spin, phase))) {
+        for (spin, phase) in with_spins(phases) {
             let late = lateness(spin, |k| k * PERIOD + phase + jitter(k, 5_000), 4_000);
             assert!(late.len() > 1_990, "phase {phase}: only {} of 2000 taken", late.len());
             assert!(late[late.len() - 1] < 1_000, "phase {phase}: {} ns late", late[late.len() - 1]);
@@ -187,7 +192,7 @@ mod tests {
     #[test]
     fn one_late_arrival_costs_nothing_but_itself() {
         let delays = [150_000, 300_000, 500_000, 700_000, 900_000];
-        for (spin, delay) in SPINS.into_iter().flat_map(|spin| delays.map(|delay| (spin, delay))) {
+        for (spin, delay) in with_spins(delays) {
             let late = lateness(spin, |k| k * PERIOD + jitter(k, 5_000) + if k % 50 == 0 { delay } else { 0 }, 4_000);
             let odd = late.iter().filter(|late| **late > 1_000).count();
             // Later than the polling lasts: that one waits for the next look, no other does.
@@ -202,7 +207,7 @@ mod tests {
     #[test]
     fn a_controller_that_moves_its_phase_is_followed() {
         let shifts = [50_000, 200_000, 400_000, 600_000, 800_000];
-        for (spin, shift) in SPINS.into_iter().flat_map(|spin| shifts.map(|shift| (spin, shift))) {
+        for (spin, shift) in with_spins(shifts) {
             let late = lateness(spin, |k| k * PERIOD + jitter(k, 5_000) + if k > 3_000 { shift } else { 0 }, 4_000);
             let odd = late.iter().filter(|late| **late > 1_000).count();
             assert!(odd <= 12, "shift {shift}: {odd} taken late");
@@ -212,7 +217,7 @@ mod tests {
     #[test]
     fn a_controller_whose_period_is_a_little_off_is_followed() {
         let drifts = [-500, -20, 20, 500];
-        for (spin, drift) in SPINS.into_iter().flat_map(|spin| drifts.map(|drift| (spin, drift))) {
+        for (spin, drift) in with_spins(drifts) {
             let late = lateness(spin, |k| k * (PERIOD + drift) + jitter(k, 5_000), 4_000);
             assert!(late[late.len() - 1] < 1_000, "drift {drift}: {} ns late", late[late.len() - 1]);
         }

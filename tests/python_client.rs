@@ -9,7 +9,7 @@ mod service;
 use ravenpose_transport::Reader;
 use ravenpose_wire::{ArmPose, CorrectedPose};
 use serde_json::{Value, json};
-use service::{World, publish_forever, role};
+use service::{CONFIG, World, publish_forever, role};
 use std::collections::HashMap;
 use std::process::Stdio;
 
@@ -47,14 +47,14 @@ fn the_official_python_package_reads_every_field() {
         return;
     };
     let world = World::new("python");
-    let config = world.config("allow_untrained = true\nallow_degraded = true");
+    let config = world.config(CONFIG);
     let _service = world.start(&config, &[]);
     let reader: Reader<CorrectedPose> = world.poses();
     let _publisher = world.role("the_official_python_package_reads_every_field", "publisher");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/read_pose.py");
     let client = world
         .command(&python.to_string_lossy())
-        .args([script, "300", &world.settings.prefix, &world.settings.root, "exact"])
+        .args([script, "1500", &world.settings.prefix, &world.settings.root, "exact"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

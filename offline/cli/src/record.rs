@@ -111,8 +111,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
     let clock = Clock::start();
     let (images, arrived) = sync_channel(webcams::WAITING_MAX);
-    // A writer that has failed is gone.
-    let webcams = Webcams::open(cameras, clock, &move |image| drop(images.send(image)))?;
+    let webcams = Webcams::open(cameras, clock, &images)?;
     let metadata = [("recorder", "ravenpose record"), ("clock", "wall clock at the start plus CLOCK_MONOTONIC since")];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let mut log = McapLog::create(out, &metadata).map_err(|error| error.to_string())?;
@@ -219,12 +218,11 @@ fn write(
             log.write_message(poses, time_ns, pose.sequence as u32, &bytes).map_err(failed)?;
         }
         // A camera that hangs may hold on to its end of the channel for ever.
-        for Image { camera, time_ns, number, jpeg, waiting } in arrived.try_iter() {
+        for Image { camera, time_ns, number, jpeg } in arrived.try_iter() {
             let Some((name, channel)) = cameras.get(camera) else { continue };
             bytes.clear();
             CompressedImage { header: Header::at(number, time_ns), data: jpeg }.encode(name, &mut bytes);
             log.write_message(*channel, time_ns, number, &bytes).map_err(failed)?;
-            drop(waiting);
         }
         if ended {
             return Box::new(log).finish().map_err(failed);

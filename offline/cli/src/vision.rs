@@ -8,9 +8,8 @@ use ::vision::track::{Mode, Tracked};
 use ::vision::video::{self, Shot, Source};
 use clap::Subcommand;
 use recordings::mcap_file::ImageSource;
+use recordings::open::Kind;
 use recordings::stream::StreamError;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -172,24 +171,21 @@ fn tracked_words(tracked: &Tracked) -> String {
     lines.join("\n") + "\n"
 }
 
-/// What a file is, its first bytes say: the recording may be one that was cut off, RUN.mcap.part. A device is not read for that.
+/// Told by its first bytes: the recording may be one that was cut off, RUN.mcap.part. A device is not read for that.
 fn is_mcap(path: &Path) -> bool {
-    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-    let mut start = [0; MAGIC.len()];
-    path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *MAGIC
+    path.is_file() && recordings::open::kind(path).is_ok_and(|kind| kind == Kind::Mcap)
 }
 
 /// A camera's images in a recording of `ravenpose record`.
 struct Recorded {
     path: PathBuf,
     images: ImageSource,
-    ended: bool,
 }
 
 impl Recorded {
     fn open(path: &Path, camera: &str) -> Result<Self, String> {
         let images = ImageSource::open(path, camera).map_err(|error| error.to_string())?;
-        Ok(Self { path: path.to_owned(), images, ended: false })
+        Ok(Self { path: path.to_owned(), images })
     }
 }
 
@@ -199,11 +195,10 @@ impl Source for Recorded {
             let StreamError { what, remedy, .. } = error;
             ::vision::Error::content(&self.path, "images", what, remedy)
         })?;
-        if image.is_none() && !self.ended {
-            self.ended = true;
-            if let Some(damage) = self.images.damage() {
-                complain!("{}: {}: {}; images before it are there", self.path.display(), damage.place, damage.what);
-            }
+        if image.is_none()
+            && let Some(damage) = self.images.damage()
+        {
+            complain!("{}: {}: {}; images before it are there", self.path.display(), damage.place, damage.what);
         }
         Ok(image.map(|image| Shot { t_s: image.time_ns as f64 / 1e9, jpeg: image.jpeg }))
     }

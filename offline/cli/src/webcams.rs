@@ -2,8 +2,8 @@
 
 use super::record::Clock;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use vision::video;
@@ -30,7 +30,7 @@ pub(crate) struct Wish {
     ffmpeg: PathBuf,
 }
 
-/// An image on its way to the disk; while it exists it counts as waiting.
+/// An image on its way to the disk.
 pub(crate) struct Image {
     /// Which camera, in the order asked for.
     pub camera: usize,
@@ -39,16 +39,6 @@ pub(crate) struct Image {
     /// Counts those of its camera from 1.
     pub number: u32,
     pub jpeg: Vec<u8>,
-    pub waiting: Waiting,
-}
-
-/// One of those that wait.
-pub(crate) struct Waiting(Arc<AtomicUsize>);
-
-impl Drop for Waiting {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
-    }
 }
 
 /// What became of a camera so far.
@@ -91,8 +81,8 @@ pub(crate) struct Webcams {
 }
 
 impl Webcams {
-    /// Opens them all; each hands its images to `send` from when [`Webcams::begin`] is called.
-    pub(crate) fn open(wish: &Wish, clock: Clock, send: &(impl Fn(Image) + Clone + Send + 'static)) -> Result<Self, String> {
+    /// Opens them all; each hands its images over from when [`Webcams::begin`] is called, and counts those for which there is no room.
+    pub(crate) fn open(wish: &Wish, clock: Clock, images: &SyncSender<Image>) -> Result<Self, String> {
         let size_px = size(&wish.image_size)?;
         if !(wish.frames_per_s >= 0.1 && wish.frames_per_s <= 1000.0) {
             return Err(format!("--frames-per-s {}: must be from 0.1 to 1000", wish.frames_per_s));
@@ -114,7 +104,7 @@ impl Webcams {
             }
             named.push((name.to_owned(), PathBuf::from(path)));
         }
-        let (begin, stop, waiting) = (Arc::default(), Arc::default(), Arc::new(AtomicUsize::new(0)));
+        let (begin, stop) = (Arc::default(), Arc::default());
         // All at once: cameras take a second each to begin.
         let opening: Vec<_> = named
             .into_iter()
@@ -129,12 +119,11 @@ impl Webcams {
                     clock,
                     begin: Arc::clone(&begin),
                     stop: Arc::clone(&stop),
-                    waiting: Arc::clone(&waiting),
+                    images: images.clone(),
                     outcome: Arc::clone(&outcome),
                 };
-                let send = send.clone();
                 // On its own: a camera that hangs holds nobody up.
-                std::thread::spawn(move || thread.run(&path, &ffmpeg, size_px, frames_per_s, &opened, &send));
+                std::thread::spawn(move || thread.run(&path, &ffmpeg, size_px, frames_per_s, &opened));
                 (name, is_open, outcome)
             })
             .collect();
@@ -187,20 +176,12 @@ struct Thread {
     clock: Clock,
     begin: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
-    waiting: Arc<AtomicUsize>,
+    images: SyncSender<Image>,
     outcome: Arc<Mutex<Outcome>>,
 }
 
 impl Thread {
-    fn run(
-        &self,
-        path: &Path,
-        ffmpeg: &Path,
-        size_px: [u32; 2],
-        frames_per_s: f64,
-        opened: &SyncSender<Result<(), String>>,
-        send: &impl Fn(Image),
-    ) {
+    fn run(&self, path: &Path, ffmpeg: &Path, size_px: [u32; 2], frames_per_s: f64, opened: &SyncSender<Result<(), String>>) {
         let source = video::open(path, ffmpeg, size_px, frames_per_s).map_err(|error| error.to_string());
         let (source, said) = match source {
             Ok(source) => (Some(source), Ok(())),
@@ -210,13 +191,13 @@ impl Thread {
         if opened.send(said).is_err() {
             return;
         }
-        let Some(fault) = source.and_then(|source| self.watch(source, send)) else { return };
+        let Some(fault) = source.and_then(|source| self.watch(source)) else { return };
         complain!("camera {}: {fault}; the recording goes on without it", self.name);
         locked(&self.outcome).fault = Some(fault);
     }
 
     /// Hands images over until it is told to stop; why it ended before, if it did.
-    fn watch(&self, mut source: Box<dyn video::Source>, send: &impl Fn(Image)) -> Option<String> {
+    fn watch(&self, mut source: Box<dyn video::Source>) -> Option<String> {
         loop {
             let next = source.next();
             let time_ns = self.clock.stamp(ravenpose_transport::now_ns());
@@ -234,14 +215,12 @@ impl Thread {
                 continue;
             }
             outcome.nothing_until(time_ns);
-            if self.waiting.fetch_add(1, Ordering::Relaxed) >= WAITING_MAX {
-                self.waiting.fetch_sub(1, Ordering::Relaxed);
-                outcome.missed += 1;
-                continue;
+            let image = Image { camera: self.camera, time_ns, number: outcome.images + 1, jpeg: shot.jpeg };
+            match self.images.try_send(image) {
+                Err(TrySendError::Full(_)) => outcome.missed += 1,
+                // A writer that is gone has failed, and says so itself.
+                Ok(()) | Err(TrySendError::Disconnected(_)) => outcome.images += 1,
             }
-            outcome.images += 1;
-            let (camera, number, waiting) = (self.camera, outcome.images, Waiting(Arc::clone(&self.waiting)));
-            send(Image { camera, time_ns, number, jpeg: shot.jpeg, waiting });
         }
     }
 }

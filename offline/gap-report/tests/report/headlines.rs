@@ -1,7 +1,6 @@
 //! One sentence per physics, right in sign, size, unit and confidence.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use gap_report::{
     Channel, DataQuality, Evidence, Feature, Identifiable, Interval, Level, Location, Motion, Parameter, Physics, Regime,

@@ -1,7 +1,6 @@
 //! report.html: well-formed, self-contained, with everything that a reader needs and in the right order.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use gap_report::{
     BeforeAfter, Channel, HeatMap, HeatRun, Level, Pictures, Quantity, Report, Share, Signature, Spectrum, headlines, html,

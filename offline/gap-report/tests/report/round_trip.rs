@@ -1,7 +1,6 @@
 //! Reports are read and written without loss.
-#![allow(missing_docs)]
 
-mod common;
+use crate::common;
 
 use gap_report::{Pictures, Report, json, write};
 use serde_json::Value;

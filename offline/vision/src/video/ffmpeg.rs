@@ -68,18 +68,22 @@ impl Words {
         Self(stderr.map(|stderr| std::thread::spawn(move || last_line(stderr))))
     }
 
-    /// The last line, once the program has ended.
-    fn last(&mut self) -> Option<String> {
+    /// The last line. Ends the program, which may still run.
+    fn last(&mut self, child: &mut Child) -> Option<String> {
+        end(child);
         self.0.take()?.join().ok().filter(|line| !line.is_empty())
     }
 }
 
-/// What the program said, in one line.
-fn fault(path: &Path, child: &mut Child, words: &mut Words) -> Error {
-    // It may still run if what it sent was no video.
+/// A webcam goes on for ever, and a program that sends no video may too.
+fn end(child: &mut Child) {
     drop(child.kill());
     drop(child.wait());
-    let said = words.last().unwrap_or_else(|| "nothing came".to_owned());
+}
+
+/// What the program said, in one line.
+fn fault(path: &Path, child: &mut Child, words: &mut Words) -> Error {
+    let said = words.last(child).unwrap_or_else(|| "nothing came".to_owned());
     Error::content(path, "ffmpeg", said, "check that it is a video, or a camera that nobody else uses")
 }
 
@@ -104,16 +108,12 @@ impl Source for Piped {
     }
 
     fn last_words(&mut self) -> Option<String> {
-        drop(self.child.kill());
-        drop(self.child.wait());
-        self.words.last()
+        self.words.last(&mut self.child)
     }
 }
 
 impl Drop for Piped {
     fn drop(&mut self) {
-        // A webcam goes on for ever.
-        drop(self.child.kill());
-        drop(self.child.wait());
+        end(&mut self.child);
     }
 }
