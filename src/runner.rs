@@ -297,17 +297,11 @@ impl<E: Estimator> Runner<E> {
     }
 
     /// Takes what waits; returns when the newest was taken, or now if nothing was.
-    ///
-    /// The clock is read after each message: read before, a message that comes while this thread is held up would be from the future.
     fn take(&mut self) -> i64 {
-        let cycle = &mut self.cycle;
-        let mut taken_ns = None;
-        let take = |state: &RavenState| cycle.offer(state, *taken_ns.insert(now_ns()));
-        if let Some(link) = &self.link
-            && link.reader.drain(take).is_err()
-        {
-            self.link_counters.receive_failures += 1;
-        }
+        let link = &self.link;
+        let drain = |take: &mut dyn FnMut(&RavenState)| link.as_ref().is_none_or(|link| link.reader.drain(take).is_ok());
+        let (taken_ns, sound) = offer_each(&mut self.cycle, now_ns, drain);
+        self.link_counters.receive_failures += u64::from(!sound);
         taken_ns.unwrap_or_else(now_ns)
     }
 
@@ -400,5 +394,52 @@ impl<E: Estimator> Runner<E> {
             let (receive, send) = (self.link_counters.receive_failures, self.link_counters.send_failures);
             self.report(Event::Link { receive, send });
         }
+    }
+}
+
+/// Offers each state that `drain` takes, with the time after it was taken; returns the last of these times, and what `drain` said.
+///
+/// Read before, the clock would put a state that comes while this thread is held up into the future: connecting to a new control
+/// process takes longer than the cycle allows for.
+fn offer_each<E: Estimator>(
+    cycle: &mut Cycle<E>,
+    clock: impl Fn() -> i64,
+    drain: impl FnOnce(&mut dyn FnMut(&RavenState)) -> bool,
+) -> (Option<i64>, bool) {
+    let mut taken_ns = None;
+    let sound = drain(&mut |state| cycle.offer(state, *taken_ns.insert(clock())));
+    (taken_ns, sound)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cycle::ArmModel;
+    use crate::network::Plan;
+    use std::cell::Cell;
+
+    #[test]
+    fn states_that_come_while_the_queue_is_read_are_not_from_the_future() {
+        let mut cycle = Cycle::<Plan>::new(Limits::default(), [ArmModel::None, ArmModel::None], true, 0);
+        let clock = Cell::new(1_000_000_000);
+        let (taken_ns, sound) = offer_each(
+            &mut cycle,
+            || clock.get(),
+            |take| {
+                for sequence in 1..=3 {
+                    // The machine stops, then the control process sends.
+                    clock.set(clock.get() + 42_000_000);
+                    let mut state = RavenState::new();
+                    state.source_id = 1;
+                    state.source_time_ns = clock.get();
+                    state.seal(sequence);
+                    take(&state);
+                }
+                true
+            },
+        );
+        assert_eq!((taken_ns, sound), (Some(clock.get()), true));
+        let counters = cycle.counters();
+        assert_eq!((counters.accepted, counters.refused, counters.skipped), (3, 0, 2));
     }
 }

@@ -20,9 +20,9 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Longest wait for the loop to send its last message: 100 ms, in ticks of this thread, so that a stop of the whole process does not
-/// count.
-const STOP_TICKS: u32 = 100;
+/// Longest wait for the loop to send its last message: half a second, in ticks of this thread, so that a stop of the whole process
+/// does not count. A loop that runs takes one period; one whose core stands still is waited for.
+const STOP_TICKS: u32 = 500;
 const STOP_TICK: Duration = Duration::from_millis(1);
 
 const USAGE: &str = "\

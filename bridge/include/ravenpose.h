@@ -257,7 +257,7 @@ typedef struct ravenpose_options {
    */
   uint32_t pose_size;
   /*
-   Readers: messages kept while nobody takes them, 1 to 64 (0: 1, the newest only).
+   Readers: messages kept while nobody takes them, 1 to 256 (0: 1, the newest only).
    */
   uint32_t queue_depth;
   /*

@@ -28,7 +28,7 @@ class Error : public std::runtime_error {
 struct Options {
   std::string prefix;        // empty: RAVENPOSE_PREFIX, else iox2_
   std::string root;          // empty: RAVENPOSE_ROOT, else /tmp/iceoryx2/
-  uint32_t queue_depth = 1;  // readers: messages kept while nobody takes them, 1 to 64
+  uint32_t queue_depth = 1;  // readers: messages kept while nobody takes them, 1 to 256
 };
 
 namespace detail {

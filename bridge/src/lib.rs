@@ -36,7 +36,7 @@ pub struct Options {
     pub state_size: u32,
     /// `sizeof(ravenpose_pose)` as the caller was compiled with.
     pub pose_size: u32,
-    /// Readers: messages kept while nobody takes them, 1 to 64 (0: 1, the newest only).
+    /// Readers: messages kept while nobody takes them, 1 to 256 (0: 1, the newest only).
     pub queue_depth: u32,
     /// Zero.
     pub reserved: [u32; 2],

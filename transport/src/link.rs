@@ -40,8 +40,9 @@ impl Message for CorrectedPose {
     const MAX_READERS: usize = 128;
 }
 
-/// Deepest queue that a reader may ask for: 64 ms of messages.
-const MAX_DEPTH: usize = 64;
+/// Deepest queue that a reader may ask for: 256 ms of messages at 1 kHz, so that a recorder loses none on a machine that stops for as
+/// long. The publisher has room for all of its readers' queues: 4 MB of states, 15 MB of poses.
+pub const DEPTH_MAX: usize = 256;
 
 type Factory<T> = PortFactory<ipc::Service, T, ()>;
 
@@ -82,7 +83,7 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
             .enable_safe_overflow(true)
             // A late reader gets the last message at once, and tells from its time how old it is.
             .history_size(1)
-            .subscriber_max_buffer_size(MAX_DEPTH)
+            .subscriber_max_buffer_size(DEPTH_MAX)
             .subscriber_max_borrowed_samples(2)
             .max_publishers(1)
             .max_subscribers(T::MAX_READERS)
@@ -234,13 +235,13 @@ pub struct Reader<T: Message> {
 }
 
 impl<T: Message> Reader<T> {
-    /// Opens the service with a queue of `depth` messages (1 to 64); the oldest is dropped when it is full.
+    /// Opens the service with a queue of `depth` messages (1 to [`DEPTH_MAX`]); the oldest is dropped when it is full.
     ///
     /// # Errors
     /// Any [`TransportError`] of opening; [`TransportError::Full`] when all places are taken.
     pub fn open(settings: &Settings, depth: usize) -> Result<Self, TransportError> {
         let opened = open::<T>(settings)?;
-        let depth = depth.clamp(1, MAX_DEPTH);
+        let depth = depth.clamp(1, DEPTH_MAX);
         let subscriber = opened.service.subscriber_builder().buffer_size(depth).create().map_err(|cause| TransportError::Full {
             service: T::SERVICE,
             role: "reader",

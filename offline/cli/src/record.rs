@@ -7,7 +7,7 @@
 use crate::webcams::{self, Image, Webcams};
 use crossbeam_queue::ArrayQueue;
 use ravenpose::{realtime, signals};
-use ravenpose_transport::{Reader, Settings};
+use ravenpose_transport::{DEPTH_MAX, Reader, Settings};
 use ravenpose_wire::{ArmPose, CorrectedPose, RavenState};
 use recordings::mcap_file::{LogChannel, McapLog};
 use recordings::ros::{COMPRESSED_IMAGE, CompressedImage, Header, MessageType, camera_topic};
@@ -18,8 +18,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Most messages that a link keeps for a reader: 64 ms at 1 kHz.
-const DEPTH: usize = 64;
 /// Messages of each stream that may wait for the disk: eight seconds.
 const WAITING_MAX: usize = 8192;
 /// The writing thread looks that often.
@@ -167,13 +165,13 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
 }
 
 fn listen(heard: &Heard, clock: Clock, stop: &AtomicBool) -> Result<Tally, String> {
-    // Without the right it listens all the same; 64 ms of patience are usually enough.
+    // Without the right it listens all the same; the 256 ms that a link keeps are usually enough.
     if let Err(missing) = realtime::set_fifo(PRIORITY) {
         say!("note: no real-time priority for the recorder ({missing}); messages may be missed on a busy machine");
     }
     let settings = Settings::from_env();
-    let states = Reader::<RavenState>::open(&settings, DEPTH).map_err(|error| error.to_string())?;
-    let poses = Reader::<CorrectedPose>::open(&settings, DEPTH).map_err(|error| error.to_string())?;
+    let states = Reader::<RavenState>::open(&settings, DEPTH_MAX).map_err(|error| error.to_string())?;
+    let poses = Reader::<CorrectedPose>::open(&settings, DEPTH_MAX).map_err(|error| error.to_string())?;
     let mut tally = Tally::default();
     let mut full = false;
     while !stop.load(Ordering::Relaxed) {
