@@ -48,7 +48,7 @@ install:
 	install -m 644 models/examples/*.toml $(DESTDIR)$(PREFIX)/share/ravenpose/models/examples/
 	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 models/raven2-worn.onnx models/raven2-worn.onnx.sha256 \
 	  $(DESTDIR)$(PREFIX)/share/ravenpose/models/
-	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
+	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(wildcard docs/*.svg) $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
 
 # Against the staged installation, as C99 and C++17, without a warning.
 examples: stage
@@ -85,13 +85,13 @@ faults: build
 bench-ci: build
 	target/release/ravenpose-bench ci
 
-# Writes docs/performance.md and build/bench/results.json.
+# Writes docs/performance.md and .svg, and build/bench/results.json.
 bench: build venv bench-offline
 	target/release/ravenpose-bench full --write
 
 # Simulator and recordings: times real time, MB/s, peak memory.
 bench-offline: offline
-	$(PYTHON3) bench/offline.py
+	$(PYTHON3) bench/offline.py --out $(BUILD)/bench/offline.txt
 
 # How far the shipped robots are off, over twenty homings.
 worn: offline

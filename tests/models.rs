@@ -51,9 +51,9 @@ fn refusal(directory: &TempDir, bytes: &[u8]) -> String {
     load_bytes(directory, bytes).err().expect("a refusal")
 }
 
-/// Runs `ravenposed --check-config` in 1 GiB of address space and a second of processor time: the kernel ends it beyond that.
+/// Runs `ravenposed --check-config` in 1 GiB of address space and 3 s of processor time: the kernel ends it beyond that.
 fn service(config: &Path) -> Output {
-    let script = "ulimit -v 1048576 && ulimit -t 1 && exec timeout -s KILL 120 \"$0\" --config \"$1\" --check-config";
+    let script = "ulimit -v 1048576 && ulimit -t 3 && exec timeout -s KILL 120 \"$0\" --config \"$1\" --check-config";
     Command::new("sh").args(["-c", script, BINARY]).arg(config).output().expect("sh")
 }
 

@@ -3,8 +3,8 @@
 //! `RAVENPOSE_KILLS` sets the number of kills of each kind of process (50; `make faults` does 10,000).
 //!
 //! Shared machines stop for a good part of a second now and then. Therefore the service has wide limits here, what must come is waited
-//! for patiently, and only the median of the times is judged. A service that its own watchdog ended because of a stop is started anew,
-//! as systemd does; that may happen no more often than the machine was seen to stop (`Stalls`).
+//! for patiently, and times are judged while the machine runs, otherwise by their median. A service that its own watchdog ended because
+//! of a stop is started anew, as systemd does; that may happen no more often than the machine was seen to stop for so long (`Stalls`).
 
 mod common;
 #[path = "common/service.rs"]
@@ -15,7 +15,7 @@ mod stalls;
 use ravenpose_transport::{Reader, Settings, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, flag};
 use service::{CONFIG, PATIENCE, Process, STALE_US, World, publish_forever, role, whole};
-use stalls::Stalls;
+use stalls::{Stalls, despite_stops};
 use std::io::{BufRead, BufReader};
 use std::time::{Duration, Instant};
 
@@ -99,6 +99,8 @@ impl Monitor {
     fn look(&mut self) {
         while let Some(pose) = self.reader.next().expect("pose read") {
             assert!(whole(&pose), "torn or mixed: {pose:?}");
+            // Nobody here sends another layout, a torn message or the time of another clock.
+            assert_eq!(pose.refused, 0, "{pose:?}");
             for arm in &pose.arm {
                 if arm.status == VALID {
                     assert!(pose.publish_time_ns - pose.source_time_ns <= STALE_NS, "stale presented as fresh: {pose:?}");
@@ -131,99 +133,124 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
     }
     let test = "fifty_kills_of_each_process_in_random_order_are_survived";
     let _machine = machine();
-    let world = World::new("kill");
-    let config = world.config(CONFIG);
-    let mut service = world.start(&config, &[]);
-    let mut publisher = world.role(test, "publisher");
-    let mut client = world.role(test, "client");
-    let mut client_output = words_of(&mut client);
-    hears_fresh(&mut client_output);
-    let stalls = Stalls::measure();
-    let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
-    monitor.watch_ms(300);
-    let baseline = common::shared_files(&world.settings.prefix).len();
-    let seed = std::env::var("RAVENPOSE_KILL_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_261_121);
-    println!("seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
-    let mut rng = common::Rng(seed);
-    let (mut fresh_ns, mut valid_ns, mut most_files) = (Vec::new(), Vec::new(), baseline);
-    let mut left = [kills(); 3];
-    let mut ended_itself = 0;
-    for kill in 0..3 * kills() {
-        // Any order, the same number of each.
-        let mut victim = rng.below(3) as usize;
-        while left[victim] == 0 {
-            victim = (victim + 1) % 3;
-        }
-        left[victim] -= 1;
-        let pause = Duration::from_millis(rng.below(50));
-        monitor.look();
-        match victim {
-            0 => {
-                publisher.kill();
-                std::thread::sleep(pause);
-                monitor.restart();
-                publisher = world.role(test, "publisher");
+    despite_stops(|| {
+        let world = World::new("kill");
+        let config = world.config(CONFIG);
+        let mut service = world.start(&config, &[]);
+        let mut publisher = world.role(test, "publisher");
+        let mut client = world.role(test, "client");
+        let mut client_output = words_of(&mut client);
+        hears_fresh(&mut client_output);
+        let stalls = Stalls::measure();
+        let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
+        monitor.watch_ms(300);
+        let baseline = common::shared_files(&world.settings.prefix).len();
+        let seed = std::env::var("RAVENPOSE_KILL_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_261_121);
+        println!("seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
+        let mut rng = common::Rng(seed);
+        // Of each victim: how long until a fresh pose, until a valid one.
+        let mut times: [[Vec<i64>; 2]; 3] = Default::default();
+        let mut most_files = baseline;
+        let mut left = [kills(); 3];
+        let mut ended_itself = 0;
+        for kill in 0..3 * kills() {
+            // Any order, the same number of each.
+            let mut victim = rng.below(3) as usize;
+            while left[victim] == 0 {
+                victim = (victim + 1) % 3;
             }
-            1 => {
-                assert!(!world.log().contains("messages refused"), "{}", world.log());
-                service.kill();
-                std::thread::sleep(pause);
-                monitor.restart();
-                service = world.start(&config, &[]);
+            left[victim] -= 1;
+            let pause = Duration::from_millis(rng.below(50));
+            monitor.look();
+            let stops = stalls.stops();
+            match victim {
+                0 => {
+                    publisher.kill();
+                    std::thread::sleep(pause);
+                    monitor.restart();
+                    publisher = world.role(test, "publisher");
+                }
+                1 => {
+                    service.kill();
+                    std::thread::sleep(pause);
+                    monitor.restart();
+                    service = world.start(&config, &[]);
+                }
+                _ => {
+                    client.kill();
+                    nothing_wrong(&mut client_output);
+                    std::thread::sleep(pause);
+                    monitor.restart();
+                    client = world.role(test, "client");
+                    client_output = words_of(&mut client);
+                }
             }
-            _ => {
-                client.kill();
-                nothing_wrong(&mut client_output);
-                std::thread::sleep(pause);
-                monitor.restart();
-                client = world.role(test, "client");
-                client_output = words_of(&mut client);
+            let mut begun = monitor.since;
+            while monitor.valid.is_none() {
+                monitor.watch_ms(1);
+                if service.0.try_wait().expect("status").is_some() {
+                    assert!(
+                        world.log().contains("the loop is stuck"),
+                        "kill {kill} of {victim}: the service ended\n{}",
+                        world.log()
+                    );
+                    ended_itself += 1;
+                    monitor.restart();
+                    begun = monitor.since;
+                    service = world.start(&config, &[]);
+                }
+                let waited = Duration::from_nanos((now_ns() - begun) as u64);
+                assert!(waited < PATIENCE, "kill {kill} of {victim}: never valid again\n{}", world.log());
             }
-        }
-        let mut begun = monitor.since;
-        while monitor.valid.is_none() {
-            monitor.watch_ms(1);
-            if service.0.try_wait().expect("status").is_some() {
-                assert!(world.log().contains("the loop is stuck"), "kill {kill} of {victim}: the service ended\n{}", world.log());
-                ended_itself += 1;
-                monitor.restart();
-                begun = monitor.since;
-                service = world.start(&config, &[]);
+            let mut fresh = monitor.fresh.expect("fresh before valid");
+            if victim == 2 {
+                fresh = fresh.max(hears_fresh(&mut client_output));
             }
-            let waited = Duration::from_nanos((now_ns() - begun) as u64);
-            assert!(waited < PATIENCE, "kill {kill} of {victim}: never valid again\n{}", world.log());
+            let took = [fresh - begun, monitor.valid.expect("valid") - begun];
+            // While the machine runs, each of them is quick; else half of them have to be.
+            assert!(stalls.stops() > stops || quick(took), "kill {kill} of {victim}: {took:?} ns\n{}", world.log());
+            for (all, one) in times[victim].iter_mut().zip(took) {
+                all.push(one);
+            }
+            most_files = most_files.max(common::shared_files(&world.settings.prefix).len());
+            monitor.watch_ms(5 + rng.below(40) as i64);
         }
-        let mut fresh = monitor.fresh.expect("fresh before valid");
-        if victim == 2 {
-            fresh = fresh.max(hears_fresh(&mut client_output));
+        for (victim, times) in ["publisher", "service", "client"].iter().zip(&mut times) {
+            for all in times.iter_mut() {
+                all.sort_unstable();
+            }
+            let [median, most] = [2, 1].map(|part| times.each_ref().map(|all| all[(all.len() - 1) / part]));
+            let ms = |ns: i64| ns / 1_000_000;
+            println!(
+                "{} kills of the {victim}, with its start: reconnected after {} ms in the median and {} ms at most, valid after {} and {} ms",
+                kills(),
+                ms(median[0]),
+                ms(most[0]),
+                ms(median[1]),
+                ms(most[1])
+            );
+            assert!(quick(median), "{victim}: half of the times are longer than {median:?} ns");
         }
-        fresh_ns.push(fresh - begun);
-        valid_ns.push(monitor.valid.expect("valid") - begun);
-        most_files = most_files.max(common::shared_files(&world.settings.prefix).len());
-        monitor.watch_ms(5 + rng.below(40) as i64);
-    }
-    fresh_ns.sort_unstable();
-    valid_ns.sort_unstable();
-    let ms = |sorted: &[i64], share: usize| sorted[(sorted.len() - 1) * share / 2] / 1_000_000;
-    println!(
-        "{} kills of each process, with the start of the process: reconnected after {} ms in the median and {} ms at most, valid after {} and {} ms; shared files {baseline} at first, {most_files} at most; the machine stopped {} times for more than {} ms, for {} ms in all, and {ended_itself} times the service ended itself",
-        kills(),
-        ms(&fresh_ns, 1),
-        ms(&fresh_ns, 2),
-        ms(&valid_ns, 1),
-        ms(&valid_ns, 2),
-        stalls.stops(),
-        stalls::LATE_NS / 1_000_000,
-        stalls.lost_ns() / 1_000_000
-    );
-    assert!(ms(&fresh_ns, 1) < 1_000 && ms(&valid_ns, 1) < 3_000, "half of the times are longer");
-    // Nobody here sends another layout, a torn message or the time of another clock.
-    assert!(!world.log().contains("messages refused"), "{}", world.log());
-    assert!(ended_itself <= stalls.stops() / 5 + kills() / 100, "the service ended itself {ended_itself} times");
-    // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
-    assert!(most_files <= 2 * baseline + 4, "leftovers grow: {most_files} from {baseline}");
-    client.kill();
-    nothing_wrong(&mut client_output);
+        println!(
+            "shared files {baseline} at first, {most_files} at most; the machine stopped {} times for more than {} ms, {} times for more than {} ms, for {} ms in all; {ended_itself} times the service ended itself",
+            stalls.stops(),
+            stalls::LATE_NS / 1_000_000,
+            stalls.long_stops(),
+            stalls::LONG_NS / 1_000_000,
+            stalls.lost_ns() / 1_000_000
+        );
+        assert!(ended_itself <= stalls.long_stops() + kills() / 100, "the service ended itself {ended_itself} times");
+        // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
+        assert!(most_files <= 2 * baseline + 4, "leftovers grow: {most_files} from {baseline}");
+        client.kill();
+        nothing_wrong(&mut client_output);
+    });
+}
+
+/// Is a time until a fresh pose, and until a valid one, as short as it is on a machine that runs? F01 and F02 want 250 ms and 2 s from
+/// new data; these hold the start of the process.
+fn quick([fresh_ns, valid_ns]: [i64; 2]) -> bool {
+    fresh_ns < 1_000_000_000 && valid_ns < 3_000_000_000
 }
 
 /// Reads what a killed client still had said.
@@ -240,60 +267,52 @@ fn every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_not
     }
     let test = "every_stop_signal_at_any_phase_says_stopping_writes_histograms_and_leaves_nothing";
     let _machine = machine();
-    let mut rng = common::Rng(42);
-    let stalls = Stalls::measure();
-    let mut quickest = Duration::MAX;
-    let mut signals = vec![libc::SIGTERM, libc::SIGINT, libc::SIGHUP];
-    let mut held_up = 0;
-    while let Some(signal) = signals.pop() {
-        let world = World::new(&format!("stop{signal}"));
-        let config = world.config(CONFIG);
-        let mut service = world.start(&config, &[]);
-        let publisher = world.role(test, "publisher");
-        let reader = world.poses();
-        let mut last = None;
-        let mut seen = 0;
-        let wanted = 150 + rng.below(100);
-        world.until("poses", || {
-            seen += reader.drain(|_| {}).expect("poses") as u64;
-            seen >= wanted
-        });
-        std::thread::sleep(Duration::from_micros(rng.below(1000)));
-        let stops = stalls.stops();
-        let asked = Instant::now();
-        service.signal(signal);
-        let status = service.end();
-        let took = asked.elapsed();
-        println!("signal {signal}: ended after {} ms", took.as_millis());
-        if status.code() == Some(1) && world.log().contains("did not stop in time") && stalls.stops() > stops && held_up < 10 {
-            // The machine held the loop's core for that long: once more.
-            held_up += 1;
-            signals.push(signal);
-            continue;
+    despite_stops(|| {
+        let mut rng = common::Rng(42);
+        let mut quickest = Duration::MAX;
+        for signal in [libc::SIGTERM, libc::SIGINT, libc::SIGHUP] {
+            let world = World::new(&format!("stop{signal}"));
+            let config = world.config(CONFIG);
+            let mut service = world.start(&config, &[]);
+            let publisher = world.role(test, "publisher");
+            let reader = world.poses();
+            let mut last = None;
+            let mut seen = 0;
+            let wanted = 150 + rng.below(100);
+            world.until("poses", || {
+                seen += reader.drain(|_| {}).expect("poses") as u64;
+                seen >= wanted
+            });
+            std::thread::sleep(Duration::from_micros(rng.below(1000)));
+            let asked = Instant::now();
+            service.signal(signal);
+            let status = service.end();
+            let took = asked.elapsed();
+            println!("signal {signal}: ended after {} ms", took.as_millis());
+            quickest = quickest.min(took);
+            assert_eq!(status.code(), Some(0), "{}", world.log());
+            while let Some(pose) = reader.next().expect("pose") {
+                last = Some(pose);
+            }
+            let last = last.expect("a last message");
+            assert!(last.arm.iter().all(|arm| arm.flags & flag::STOPPING != 0 && arm.correction_um == [0.0; 3]), "{last:?}");
+            for stage in ["total", "input_to_output", "inference"] {
+                let hgrm = std::fs::read_to_string(world.dir.0.join(format!("histograms/{stage}.hgrm"))).expect("histogram");
+                assert!(hgrm.contains("#[Max"), "{hgrm}");
+            }
+            drop(publisher);
+            drop(reader);
+            // The publisher was killed: whoever comes next cleans up after it.
+            drop(ravenpose_transport::Probe::open(&world.settings).expect("a newcomer"));
+            let left: Vec<_> = common::shared_files(&world.settings.prefix)
+                .into_iter()
+                .filter(|path| !path.to_string_lossy().ends_with(".global_mgmt"))
+                .collect();
+            assert!(left.is_empty(), "left in shared memory: {left:?}");
         }
-        quickest = quickest.min(took);
-        assert_eq!(status.code(), Some(0), "{}", world.log());
-        while let Some(pose) = reader.next().expect("pose") {
-            last = Some(pose);
-        }
-        let last = last.expect("a last message");
-        assert!(last.arm.iter().all(|arm| arm.flags & flag::STOPPING != 0 && arm.correction_um == [0.0; 3]), "{last:?}");
-        for stage in ["total", "input_to_output", "inference"] {
-            let hgrm = std::fs::read_to_string(world.dir.0.join(format!("histograms/{stage}.hgrm"))).expect("histogram");
-            assert!(hgrm.contains("#[Max"), "{hgrm}");
-        }
-        drop(publisher);
-        drop(reader);
-        // The publisher was killed: whoever comes next cleans up after it.
-        drop(ravenpose_transport::Probe::open(&world.settings).expect("a newcomer"));
-        let left: Vec<_> = common::shared_files(&world.settings.prefix)
-            .into_iter()
-            .filter(|path| !path.to_string_lossy().ends_with(".global_mgmt"))
-            .collect();
-        assert!(left.is_empty(), "left in shared memory: {left:?}");
-    }
-    // The machine may hold one of them up; not all.
-    assert!(quickest <= Duration::from_millis(200), "{quickest:?}");
+        // The machine may hold one of them up; not all.
+        assert!(quickest <= Duration::from_millis(200), "{quickest:?}");
+    });
 }
 
 #[test]
@@ -302,43 +321,47 @@ fn readers_that_never_read_cost_the_loop_nothing() {
         publish_forever();
     }
     let _machine = machine();
-    let world = World::new("idle");
-    let config = world.config(CONFIG);
-    let _service = world.start(&config, &[]);
-    // All places but one, by clients that connect and then sleep for ever; the last one reads.
-    let idle: Vec<Reader<CorrectedPose>> = (1..128).map(|_| Reader::open(&world.settings, 64).expect("a place")).collect();
-    let reader = world.poses();
-    assert!(Reader::<CorrectedPose>::open(&world.settings, 1).is_err_and(|error| error.to_string().contains("no free place")));
-    let _publisher = world.role("readers_that_never_read_cost_the_loop_nothing", "publisher");
-    let (mut poses, mut last) = (0_u64, 0);
-    world.until("2000 poses", || {
-        while let Some(pose) = reader.next().expect("pose") {
-            poses += 1;
-            assert!(pose.sequence > last, "in order");
-            last = pose.sequence;
-        }
-        poses > 2_000
+    despite_stops(|| {
+        let world = World::new("idle");
+        let config = world.config(CONFIG);
+        let _service = world.start(&config, &[]);
+        // All places but one, by clients that connect and then sleep for ever; the last one reads.
+        let idle: Vec<Reader<CorrectedPose>> = (1..128).map(|_| Reader::open(&world.settings, 64).expect("a place")).collect();
+        let reader = world.poses();
+        assert!(Reader::<CorrectedPose>::open(&world.settings, 1).is_err_and(|error| error.to_string().contains("no free place")));
+        let _publisher = world.role("readers_that_never_read_cost_the_loop_nothing", "publisher");
+        let (mut poses, mut last) = (0_u64, 0);
+        world.until("2000 poses", || {
+            while let Some(pose) = reader.next().expect("pose") {
+                poses += 1;
+                assert!(pose.sequence > last, "in order");
+                last = pose.sequence;
+            }
+            poses > 2_000
+        });
+        // The idle ones hold the newest 64, the oldest were overwritten.
+        let kept = idle[0].drain(|_| {}).expect("queue");
+        assert_eq!(kept, 64);
+        let stats = std::fs::read(world.dir.0.join("run/stats.json")).expect("statistics");
+        let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
+        let failures = stats.counters.iter().find(|counter| counter.name == "send_failures").expect("counter");
+        assert_eq!(failures.value, 0);
     });
-    // The idle ones hold the newest 64, the oldest were overwritten.
-    let kept = idle[0].drain(|_| {}).expect("queue");
-    assert_eq!(kept, 64);
-    let stats = std::fs::read(world.dir.0.join("run/stats.json")).expect("statistics");
-    let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
-    let failures = stats.counters.iter().find(|counter| counter.name == "send_failures").expect("counter");
-    assert_eq!(failures.value, 0);
 }
 
 #[test]
 fn a_second_service_is_refused_and_the_first_lives_on() {
     let _machine = machine();
-    let world = World::new("twice");
-    let config = world.config(CONFIG);
-    let mut first = world.start(&config, &[]);
-    let second = world.service(&config).output().expect("the second ends");
-    let words = String::from_utf8_lossy(&second.stderr);
-    assert_eq!(second.status.code(), Some(2), "{words}");
-    assert!(words.lines().last().is_some_and(|line| line.contains("raven/pose") && line.contains("no free place")), "{words}");
-    assert!(first.0.try_wait().expect("status").is_none(), "the first lives on");
+    despite_stops(|| {
+        let world = World::new("twice");
+        let config = world.config(CONFIG);
+        let mut first = world.start(&config, &[]);
+        let second = world.service(&config).output().expect("the second ends");
+        let words = String::from_utf8_lossy(&second.stderr);
+        assert_eq!(second.status.code(), Some(2), "{words}");
+        assert!(words.lines().last().is_some_and(|line| line.contains("raven/pose") && line.contains("no free place")), "{words}");
+        assert!(first.0.try_wait().expect("status").is_none(), "the first lives on");
+    });
 }
 
 #[test]
@@ -348,40 +371,42 @@ fn a_service_whose_files_were_removed_opens_its_link_anew() {
     }
     let test = "a_service_whose_files_were_removed_opens_its_link_anew";
     let _machine = machine();
-    let world = World::new("removed");
-    let config = world.config(CONFIG);
-    let _service = world.start(&config, &[]);
-    let mut publisher = world.role(test, "publisher");
-    // A newcomer's fresh pose within two seconds. One that stays so long: services of one name share their file names, so newcomers
-    // that come and go disturb a link that is being opened.
-    let fresh_pose = || {
-        let Ok(reader) = Reader::<CorrectedPose>::open(&world.settings, 1) else { return false };
-        let begun = Instant::now();
-        while begun.elapsed() < Duration::from_secs(2) {
-            if let Ok(Some(pose)) = reader.latest()
-                && now_ns() - pose.source_time_ns < STALE_NS
-            {
-                return true;
+    despite_stops(|| {
+        let world = World::new("removed");
+        let config = world.config(CONFIG);
+        let _service = world.start(&config, &[]);
+        let mut publisher = world.role(test, "publisher");
+        // A newcomer's fresh pose within two seconds. One that stays so long: services of one name share their file names, so newcomers
+        // that come and go disturb a link that is being opened.
+        let fresh_pose = || {
+            let Ok(reader) = Reader::<CorrectedPose>::open(&world.settings, 1) else { return false };
+            let begun = Instant::now();
+            while begun.elapsed() < Duration::from_secs(2) {
+                if let Ok(Some(pose)) = reader.latest()
+                    && now_ns() - pose.source_time_ns < STALE_NS
+                {
+                    return true;
+                }
+                std::thread::sleep(Duration::from_millis(1));
             }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        false
-    };
-    world.until("poses at first", fresh_pose);
-    publisher.kill();
-    common::remove_shared_memory(&world.settings.prefix);
-    let _ = std::fs::remove_dir_all(&world.settings.root);
-    let _publisher = world.role(test, "publisher");
-    world.until("an opening", || world.log().contains("the link was opened anew"));
-    // One opening may not be enough: for 20 s (`REOPEN_AGAIN`) the service looks and repeats it. Then it is left alone, and reached.
-    let openings = || world.log().matches("opening the link anew").count();
-    let begun = Instant::now();
-    world.until("a link that is left alone", || {
-        let opened = openings();
-        std::thread::sleep(Duration::from_secs(4));
-        fresh_pose() && openings() == opened
+            false
+        };
+        world.until("poses at first", fresh_pose);
+        publisher.kill();
+        common::remove_shared_memory(&world.settings.prefix);
+        let _ = std::fs::remove_dir_all(&world.settings.root);
+        let _publisher = world.role(test, "publisher");
+        world.until("an opening", || world.log().contains("the link was opened anew"));
+        // One opening may not be enough: for 20 s (`REOPEN_AGAIN`) the service looks and repeats it. Then it is left alone, and reached.
+        let openings = || world.log().matches("opening the link anew").count();
+        let begun = Instant::now();
+        world.until("a link that is left alone", || {
+            let opened = openings();
+            std::thread::sleep(Duration::from_secs(4));
+            fresh_pose() && openings() == opened
+        });
+        println!("settled after {} openings and {} s", openings(), begun.elapsed().as_secs());
     });
-    println!("settled after {} openings and {} s", openings(), begun.elapsed().as_secs());
 }
 
 #[test]
@@ -390,24 +415,26 @@ fn a_working_link_is_left_alone_when_its_files_are_removed() {
         publish_forever();
     }
     let _machine = machine();
-    let world = World::new("robbed");
-    let config = world.config(CONFIG);
-    let _service = world.start(&config, &[]);
-    let reader = world.poses();
-    let _publisher = world.role("a_working_link_is_left_alone_when_its_files_are_removed", "publisher");
-    world.until("a pose", || reader.next().expect("pose").is_some());
-    common::remove_shared_memory(&world.settings.prefix);
-    let begun = Instant::now();
-    let (mut poses, mut valid) = (0, 0);
-    // A broken link gives none at all. Long enough for the service to notice that its files are gone.
-    world.until("valid poses after the files were removed", || {
-        while let Some(pose) = reader.next().expect("pose") {
-            poses += 1;
-            valid += u64::from(pose.arm[0].status == VALID);
-        }
-        poses > 500 && valid > 50 && begun.elapsed() > Duration::from_secs(5)
+    despite_stops(|| {
+        let world = World::new("robbed");
+        let config = world.config(CONFIG);
+        let _service = world.start(&config, &[]);
+        let reader = world.poses();
+        let _publisher = world.role("a_working_link_is_left_alone_when_its_files_are_removed", "publisher");
+        world.until("a pose", || reader.next().expect("pose").is_some());
+        common::remove_shared_memory(&world.settings.prefix);
+        let begun = Instant::now();
+        let (mut poses, mut valid) = (0, 0);
+        // A broken link gives none at all. Long enough for the service to notice that its files are gone.
+        world.until("valid poses after the files were removed", || {
+            while let Some(pose) = reader.next().expect("pose") {
+                poses += 1;
+                valid += u64::from(pose.arm[0].status == VALID);
+            }
+            poses > 500 && valid > 50 && begun.elapsed() > Duration::from_secs(5)
+        });
+        let words = world.log();
+        assert_eq!(words.matches("newcomers cannot join").count(), 1, "{words}");
+        assert!(!words.contains("opening the link anew"), "{words}");
     });
-    let words = world.log();
-    assert_eq!(words.matches("newcomers cannot join").count(), 1, "{words}");
-    assert!(!words.contains("opening the link anew"), "{words}");
 }

@@ -5,11 +5,14 @@
 mod common;
 #[path = "common/service.rs"]
 mod service;
+#[path = "common/stalls.rs"]
+mod stalls;
 
 use ravenpose_transport::Reader;
 use ravenpose_wire::{ArmPose, CorrectedPose};
 use serde_json::{Value, json};
 use service::{CONFIG, World, publish_forever, role};
+use stalls::despite_stops;
 use std::collections::HashMap;
 use std::process::Stdio;
 
@@ -46,42 +49,44 @@ fn the_official_python_package_reads_every_field() {
         println!("skipped: RAVENPOSE_PYTHON names no interpreter with iceoryx2 0.9.3 (make test makes one)");
         return;
     };
-    let world = World::new("python");
-    let config = world.config(CONFIG);
-    let _service = world.start(&config, &[]);
-    let reader: Reader<CorrectedPose> = world.poses();
-    let _publisher = world.role("the_official_python_package_reads_every_field", "publisher");
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/read_pose.py");
-    let client = world
-        .command(&python.to_string_lossy())
-        .args([script, "1500", &world.settings.prefix, &world.settings.root, "exact"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("python");
-    // Read beside it; the client's end is seen through its output.
-    let waiting = std::thread::spawn(move || client.wait_with_output().expect("python ends"));
-    let mut seen = HashMap::new();
-    while !waiting.is_finished() {
-        while let Some(pose) = reader.next().expect("pose") {
-            seen.insert(pose.sequence, expected(&pose));
+    despite_stops(|| {
+        let world = World::new("python");
+        let config = world.config(CONFIG);
+        let _service = world.start(&config, &[]);
+        let reader: Reader<CorrectedPose> = world.poses();
+        let _publisher = world.role("the_official_python_package_reads_every_field", "publisher");
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/python/read_pose.py");
+        let client = world
+            .command(&python.to_string_lossy())
+            .args([script, "1500", &world.settings.prefix, &world.settings.root, "exact"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("python");
+        // Read beside it; the client's end is seen through its output.
+        let waiting = std::thread::spawn(move || client.wait_with_output().expect("python ends"));
+        let mut seen = HashMap::new();
+        while !waiting.is_finished() {
+            while let Some(pose) = reader.next().expect("pose") {
+                seen.insert(pose.sequence, expected(&pose));
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
         }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    let output = waiting.join().expect("joined");
-    let text = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-    let mut compared = 0;
-    let mut corrected = 0;
-    for line in text.lines().filter(|line| line.starts_with('{')) {
-        let read: Value = serde_json::from_str(line).expect("JSON");
-        let sequence = read["sequence"].as_u64().expect("sequence");
-        if let Some(expected) = seen.get(&sequence) {
-            assert_eq!(&read, expected, "pose {sequence}");
-            compared += 1;
-            corrected += u64::from(read["arm"][0]["correction_um"][0] != number(0.0));
+        let output = waiting.join().expect("joined");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+        let mut compared = 0;
+        let mut corrected = 0;
+        for line in text.lines().filter(|line| line.starts_with('{')) {
+            let read: Value = serde_json::from_str(line).expect("JSON");
+            let sequence = read["sequence"].as_u64().expect("sequence");
+            if let Some(expected) = seen.get(&sequence) {
+                assert_eq!(&read, expected, "pose {sequence}");
+                compared += 1;
+                corrected += u64::from(read["arm"][0]["correction_um"][0] != number(0.0));
+            }
         }
-    }
-    println!("{compared} poses compared field by field, {corrected} of them with a correction");
-    assert!(compared > 250 && corrected > 100);
+        println!("{compared} poses compared field by field, {corrected} of them with a correction");
+        assert!(compared > 250 && corrected > 100);
+    });
 }

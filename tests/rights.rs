@@ -4,9 +4,12 @@
 mod common;
 #[path = "common/service.rs"]
 mod service;
+#[path = "common/stalls.rs"]
+mod stalls;
 
 use ravenpose::report::Stats;
 use service::{CONFIG, World, publish_forever, role};
+use stalls::despite_stops;
 use std::os::unix::fs::chown;
 use std::os::unix::process::CommandExt;
 use std::process::Command;
@@ -107,34 +110,36 @@ fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
     if !may_change_user() {
         return;
     }
-    let world = world("degraded");
-    let config = config(&world, CONFIG);
-    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
-    let mut service = service::Process(without_rights(&mut service_of(&world, &config)).stderr(log).spawn().expect("service"));
-    let this = std::env::current_exe().expect("this program");
-    let this = world.dir.0.join(this.file_name().expect("a file"));
-    let mut publisher = world.command(&this.display().to_string());
-    let publisher = without_rights(&mut publisher)
-        .args(["with_allow_degraded_it_goes_on_and_every_message_says_so", "--exact", "--nocapture"])
-        .env("RAVENPOSE_TEST_ROLE", "publisher")
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .expect("publisher");
-    let _publisher = service::Process(publisher);
-    let mut arms = Vec::new();
-    world.until("200 poses", || {
-        let read = std::fs::read(world.dir.0.join("run/stats.json")).unwrap_or_default();
-        let Ok(stats) = serde_json::from_slice::<Stats>(&read) else { return false };
-        arms = stats.arms;
-        stats.counters.iter().any(|counter| counter.name == "published" && counter.value > 200)
+    despite_stops(|| {
+        let world = world("degraded");
+        let config = config(&world, CONFIG);
+        let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
+        let mut service = service::Process(without_rights(&mut service_of(&world, &config)).stderr(log).spawn().expect("service"));
+        let this = std::env::current_exe().expect("this program");
+        let this = world.dir.0.join(this.file_name().expect("a file"));
+        let mut publisher = world.command(&this.display().to_string());
+        let publisher = without_rights(&mut publisher)
+            .args(["with_allow_degraded_it_goes_on_and_every_message_says_so", "--exact", "--nocapture"])
+            .env("RAVENPOSE_TEST_ROLE", "publisher")
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .expect("publisher");
+        let _publisher = service::Process(publisher);
+        let mut arms = Vec::new();
+        world.until("200 poses", || {
+            let read = std::fs::read(world.dir.0.join("run/stats.json")).unwrap_or_default();
+            let Ok(stats) = serde_json::from_slice::<Stats>(&read) else { return false };
+            arms = stats.arms;
+            stats.counters.iter().any(|counter| counter.name == "published" && counter.value > 200)
+        });
+        for arm in &arms {
+            assert!(arm.flags.iter().any(|flag| flag == "not_realtime"), "{arm:?}");
+        }
+        let words = world.log();
+        assert!(words.contains("NOT REAL TIME: memory cannot be locked") && words.contains("NOT REAL TIME: SCHED_FIFO"), "{words}");
+        service.signal(libc::SIGTERM);
+        assert_eq!(service.end().code(), Some(0));
     });
-    for arm in &arms {
-        assert!(arm.flags.iter().any(|flag| flag == "not_realtime"), "{arm:?}");
-    }
-    let words = world.log();
-    assert!(words.contains("NOT REAL TIME: memory cannot be locked") && words.contains("NOT REAL TIME: SCHED_FIFO"), "{words}");
-    service.signal(libc::SIGTERM);
-    assert_eq!(service.end().code(), Some(0));
 }
 
 #[test]
@@ -142,23 +147,25 @@ fn a_rejected_model_is_flagged_where_that_is_allowed() {
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
-    let world = World::new("rejected");
-    let broken = world.dir.file("broken.onnx", b"not a model");
-    world.dir.file("broken.onnx.sha256", "0000000000000000000000000000000000000000000000000000000000000000  broken.onnx\n");
-    let path = world.config(CONFIG);
-    let text = std::fs::read_to_string(&path).expect("configuration");
-    let green = text.find("[green]").expect("green");
-    let report = text.find("[report]").expect("report");
-    let text = format!("{}[green]\nmodel = \"{}\"\n{}", &text[..green], broken.display(), &text[report..]);
-    std::fs::write(&path, text).expect("configuration");
-    let _service = world.start(&path, &[]);
-    let reader = world.poses();
-    let _publisher = world.role("a_rejected_model_is_flagged_where_that_is_allowed", "publisher");
-    world.until("a valid pose", || {
-        let Some(pose) = reader.next().expect("pose") else { return false };
-        assert_ne!(pose.arm[1].flags & ravenpose_wire::flag::MODEL_REJECTED, 0);
-        assert_eq!(pose.arm[1].correction_um, [0.0; 3]);
-        pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32
+    despite_stops(|| {
+        let world = World::new("rejected");
+        let broken = world.dir.file("broken.onnx", b"not a model");
+        world.dir.file("broken.onnx.sha256", "0000000000000000000000000000000000000000000000000000000000000000  broken.onnx\n");
+        let path = world.config(CONFIG);
+        let text = std::fs::read_to_string(&path).expect("configuration");
+        let green = text.find("[green]").expect("green");
+        let report = text.find("[report]").expect("report");
+        let text = format!("{}[green]\nmodel = \"{}\"\n{}", &text[..green], broken.display(), &text[report..]);
+        std::fs::write(&path, text).expect("configuration");
+        let _service = world.start(&path, &[]);
+        let reader = world.poses();
+        let _publisher = world.role("a_rejected_model_is_flagged_where_that_is_allowed", "publisher");
+        world.until("a valid pose", || {
+            let Some(pose) = reader.next().expect("pose") else { return false };
+            assert_ne!(pose.arm[1].flags & ravenpose_wire::flag::MODEL_REJECTED, 0);
+            assert_eq!(pose.arm[1].correction_um, [0.0; 3]);
+            pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32
+        });
+        assert!(world.log().contains("broken.onnx: SHA-256 is"), "{}", world.log());
     });
-    assert!(world.log().contains("broken.onnx: SHA-256 is"), "{}", world.log());
 }

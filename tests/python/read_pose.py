@@ -87,7 +87,7 @@ def main():
     service = node.service_builder(iox2.ServiceName.new("raven/pose")).publish_subscribe(CorrectedPose).open()
     subscriber = service.subscriber_builder().create()
     print("connected", flush=True)
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 90
     while count > 0 and time.monotonic() < deadline:
         sample = subscriber.receive()
         if sample is None:

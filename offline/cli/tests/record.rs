@@ -8,7 +8,7 @@ use ravenpose_transport::{Settings, Writer, now_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
 use recordings::mcap_file::{ImageSource, McapSource};
 use recordings::stream::{Record, Source};
-use stalls::Stalls;
+use stalls::despite_stops;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -109,17 +109,33 @@ fn states_of(path: &Path) -> Vec<RavenState> {
 
 #[test]
 fn what_is_recorded_is_whole_and_in_order() {
-    let world = World::new("whole");
-    let out = world.folder.join("run.mcap");
-    let (code, said, _) = world.recorded(&out, "3", &[]);
-    assert!(code.is_some_and(|code| code < 2), "{said}");
-    let states = states_of(&out);
-    assert!(states.len() > 500, "{} states; {said}", states.len());
-    assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
-    assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
-    let missed = states.last().expect("states").sequence - states[0].sequence + 1 - states.len() as u64;
-    assert!(said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")), "{said}");
-    assert!(!out.with_extension("mcap.part").exists());
+    despite_stops(|| {
+        let world = World::new("whole");
+        let out = world.folder.join("run.mcap");
+        let (code, said, _) = world.recorded(&out, "3", &[]);
+        assert!(code.is_some_and(|code| code < 2), "{said}");
+        let states = states_of(&out);
+        assert!(states.len() > 500, "{} states; {said}", states.len());
+        assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
+        assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
+        // Their header is empty: readers then go by the recorder's clock.
+        let header_ns = |state: &RavenState| i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
+        let ahead_ns = header_ns(&states[0]) - states[0].source_time_ns;
+        assert!(states.iter().all(|state| header_ns(state) - state.source_time_ns == ahead_ns), "{ahead_ns}");
+        assert!((ahead_ns - wall_clock_ahead_ns()).abs() < 2_000_000_000, "{ahead_ns}");
+        let missed = states.last().expect("states").sequence - states[0].sequence + 1 - states.len() as u64;
+        assert!(
+            said.contains(&format!("{} states,", states.len())) && said.contains(&format!("recorder: {missed} states")),
+            "{said}"
+        );
+        assert!(!out.with_extension("mcap.part").exists());
+    });
+}
+
+/// The wall clock minus the monotonic one.
+fn wall_clock_ahead_ns() -> i64 {
+    let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
+    since_1970.as_nanos() as i64 - now_ns()
 }
 
 /// The number behind some words.
@@ -132,14 +148,22 @@ fn count_of(said: &str, words: &str) -> u64 {
 /// `RAVENPOSE_RECORD_SECONDS=3600 cargo test --release -p ravenpose-cli --test record -- --nocapture nothing_is_lost` is the hour.
 #[test]
 fn nothing_is_lost() {
+    match std::env::var("RAVENPOSE_RECORD_SECONDS") {
+        Ok(seconds) => whole_for(&seconds, true),
+        // A machine that other tests load may stall a process for longer than a link keeps states.
+        Err(_) => despite_stops(|| whole_for("5", false)),
+    }
+}
+
+/// All that came is in the file, and with `nothing_missed` all that was sent came.
+fn whole_for(seconds: &str, nothing_missed: bool) {
     let world = World::new("long");
     let out = world.folder.join("run.mcap");
     let program = webcam(&world, "camera", [1280, 720], "1000000");
     let mut more = vec!["--ffmpeg", program.to_str().expect("UTF-8"), "--frames-per-s", "20"];
     more.extend(["--camera", "cam0=/dev/null", "--camera", "cam1=/dev/null"]);
     more.extend(["--camera", "cam2=/dev/null", "--camera", "cam3=/dev/null"]);
-    let seconds = std::env::var("RAVENPOSE_RECORD_SECONDS").unwrap_or_else(|_| "5".to_owned());
-    let (_, said, sent) = world.recorded(&out, &seconds, &more);
+    let (_, said, sent) = world.recorded(&out, seconds, &more);
     let mut source = McapSource::open(&out).expect("MCAP");
     let (mut states, mut last) = (0_u64, None);
     let mut missed = 0;
@@ -156,53 +180,41 @@ fn nothing_is_lost() {
     assert!(said.contains(&format!(": {states} states, ")) && said.contains(&format!("recorder: {missed} states")), "{said}");
     let counted: u64 = (0..4).map(|k| count_of(&said, &format!("cam{k}: "))).sum();
     assert_eq!(counted, images, "{said}");
-    assert!(seconds == "5" || said.contains("recorder: 0 states") && said.matches(" images, 0 missed").count() == 4, "{said}");
-    // How many come in a second is the machine's business, but for the long run.
-    assert!(images > 40 && states > 500, "{said}");
-    if seconds != "5" {
-        assert_eq!(missed, 0, "{said}");
+    // Until the end, and most of them.
+    assert!(last.is_some_and(|last| last + 3_000 > sent), "{last:?} of {sent}; {said}");
+    let wanted_s = seconds.parse::<f64>().expect("seconds") - 2.0;
+    assert!(images as f64 > 4.0 * 10.0 * wanted_s && states as f64 > 900.0 * wanted_s, "{said}");
+    if nothing_missed {
+        assert!(missed == 0 && said.matches(" images, 0 missed").count() == 4, "{said}");
     }
 }
 
 #[test]
 fn a_killed_recorder_leaves_all_but_the_last_second() {
-    // A machine that stops holds up the disk's thread as well: then once more.
-    let stalls = Stalls::measure();
-    for attempt in 0..5 {
-        let stops = stalls.stops();
-        let missing_ns = missing_before_a_kill(attempt);
+    despite_stops(|| {
+        let world = World::new("killed");
+        let stop = AtomicBool::new(false);
+        let out = world.folder.join("run.mcap");
+        let part = world.folder.join("run.mcap.part");
+        let killed_ns = std::thread::scope(|scope| {
+            let publisher = scope.spawn(|| publish(&world.settings, &stop));
+            let mut child = world.record(&out, None, &[]);
+            let begun = Instant::now();
+            while begun.elapsed() < Duration::from_mins(1) && std::fs::metadata(&part).map_or(0, |meta| meta.len()) < 150_000 {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            let killed_ns = now_ns();
+            child.kill().expect("killed");
+            let _ = child.wait();
+            stop.store(true, Ordering::Relaxed);
+            let _ = publisher.join().expect("publisher");
+            killed_ns
+        });
+        assert!(!out.exists());
+        let missing_ns = killed_ns - states_of(&part).last().expect("states").source_time_ns;
         println!("the last state is {} ms older than the kill", missing_ns / 1_000_000);
-        if missing_ns < 1_000_000_000 {
-            return;
-        }
-        assert!(stalls.stops() > stops, "{missing_ns} ns are missing");
-    }
-    panic!("the machine stopped in each of five attempts");
-}
-
-/// Kills a recorder; how much older than the kill the last state is that it left.
-fn missing_before_a_kill(attempt: u32) -> i64 {
-    let world = World::new(&format!("killed{attempt}"));
-    let stop = AtomicBool::new(false);
-    let out = world.folder.join("run.mcap");
-    let part = world.folder.join("run.mcap.part");
-    let killed_ns = std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| publish(&world.settings, &stop));
-        let mut child = world.record(&out, None, &[]);
-        let begun = Instant::now();
-        while begun.elapsed() < Duration::from_mins(1) && std::fs::metadata(&part).map_or(0, |meta| meta.len()) < 150_000 {
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        let killed_ns = now_ns();
-        child.kill().expect("killed");
-        let _ = child.wait();
-        stop.store(true, Ordering::Relaxed);
-        let _ = publisher.join().expect("publisher");
-        killed_ns
+        assert!(missing_ns < 1_000_000_000, "{missing_ns} ns are missing");
     });
-    assert!(!out.exists());
-    let states = states_of(&part);
-    killed_ns - states.last().expect("states").source_time_ns
 }
 
 #[test]
@@ -248,78 +260,87 @@ fn webcam(world: &World, name: &str, [w, h]: [u32; 2], images: &str) -> PathBuf 
 
 #[test]
 fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
-    let world = World::new("webcams");
-    let program = webcam(&world, "camera", [64, 48], "1000000");
-    let out = world.folder.join("run.mcap");
-    let ffmpeg = program.to_str().expect("UTF-8");
-    // Any device stands for the webcam: the program asks nothing of it.
-    let more = ["--ffmpeg", ffmpeg, "--camera", "cam0=/dev/null", "--camera", "cam1=/dev/zero", "--image-size", "64x48"];
-    let (code, text, _) = world.recorded(&out, "3", &more);
-    assert!(code.is_some_and(|code| code < 2) && text.contains("cam0: ") && text.contains("cam1: "), "{text}");
-    let states = states_of(&out);
-    assert!(states.len() > 500);
-    let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970").as_nanos() as i64;
-    let ahead_ns = since_1970 - now_ns();
-    let wall = |monotonic_ns: i64| monotonic_ns + ahead_ns;
-    let mut source = McapSource::open(&out).expect("MCAP");
-    while source.next().expect("record").is_some() {}
-    let channels = source.channels();
-    for camera in ["cam0", "cam1"] {
-        let mut images = ImageSource::open(&out, camera).expect("images");
-        let all: Vec<_> = std::iter::from_fn(|| images.next_image().expect("image")).collect();
-        let topic = format!("/camera/{camera}/compressed");
-        let shown = channels.iter().find(|channel| channel.topic == topic).expect("channel");
-        assert_eq!((shown.messages, shown.type_name.as_str()), (all.len() as u64, "sensor_msgs/CompressedImage"));
-        assert!(all.len() >= 10 && all.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns));
-        // The four pictures in turn, each whole.
-        let begin = |name: usize| std::fs::read(world.folder.join(format!("camera-{name}"))).expect("file")[8..].to_vec();
-        let first = (0..4).find(|&name| begin(name).starts_with(&all[0].jpeg)).expect("one of the pictures");
-        for (index, image) in all.iter().enumerate() {
-            assert!(begin((first + index) % 4).starts_with(&image.jpeg) && image.jpeg.len() > 100, "{index}");
+    despite_stops(|| {
+        let world = World::new("webcams");
+        let program = webcam(&world, "camera", [64, 48], "1000000");
+        let out = world.folder.join("run.mcap");
+        let ffmpeg = program.to_str().expect("UTF-8");
+        // Any device stands for the webcam: the program asks nothing of it.
+        let more = ["--ffmpeg", ffmpeg, "--camera", "cam0=/dev/null", "--camera", "cam1=/dev/zero", "--image-size", "64x48"];
+        let (code, text, _) = world.recorded(&out, "3", &more);
+        assert!(code.is_some_and(|code| code < 2) && text.contains("cam0: ") && text.contains("cam1: "), "{text}");
+        let states = states_of(&out);
+        assert!(states.len() > 500);
+        let ahead_ns = wall_clock_ahead_ns();
+        let wall = |monotonic_ns: i64| monotonic_ns + ahead_ns;
+        let mut source = McapSource::open(&out).expect("MCAP");
+        while source.next().expect("record").is_some() {}
+        let channels = source.channels();
+        for camera in ["cam0", "cam1"] {
+            let mut images = ImageSource::open(&out, camera).expect("images");
+            let all: Vec<_> = std::iter::from_fn(|| images.next_image().expect("image")).collect();
+            let topic = format!("/camera/{camera}/compressed");
+            let shown = channels.iter().find(|channel| channel.topic == topic).expect("channel");
+            assert_eq!((shown.messages, shown.type_name.as_str()), (all.len() as u64, "sensor_msgs/CompressedImage"));
+            assert!(all.len() >= 10 && all.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns));
+            // The four pictures in turn, each whole.
+            let begin = |name: usize| std::fs::read(world.folder.join(format!("camera-{name}"))).expect("file")[8..].to_vec();
+            let first = (0..4).find(|&name| begin(name).starts_with(&all[0].jpeg)).expect("one of the pictures");
+            for (index, image) in all.iter().enumerate() {
+                assert!(begin((first + index) % 4).starts_with(&image.jpeg) && image.jpeg.len() > 100, "{index}");
+            }
+            // On one clock: the images lie in the time in which states were heard, or as long beside it as a shared machine stops.
+            let (first_ns, last_ns) = (wall(states[0].source_time_ns), wall(states.last().expect("state").source_time_ns));
+            let (image_ns, final_ns) = (all[0].time_ns, all.last().expect("image").time_ns);
+            assert!(
+                (image_ns - first_ns).abs() < 2_000_000_000 && (final_ns - last_ns).abs() < 2_000_000_000,
+                "{image_ns} {first_ns}"
+            );
         }
-        // On one clock: the images lie in the time in which states were heard, or as long beside it as a shared machine stops.
-        let (first_ns, last_ns) = (wall(states[0].source_time_ns), wall(states.last().expect("state").source_time_ns));
-        let (image_ns, final_ns) = (all[0].time_ns, all.last().expect("image").time_ns);
-        assert!((image_ns - first_ns).abs() < 2_000_000_000 && (final_ns - last_ns).abs() < 2_000_000_000, "{image_ns} {first_ns}");
-    }
-    let absent = ImageSource::open(&out, "cam7").expect("MCAP").next_image().expect_err("no such camera").to_string();
-    assert!(absent.contains("/camera/cam7/compressed") && absent.contains("/camera/cam0/compressed"), "{absent}");
+        let absent = ImageSource::open(&out, "cam7").expect("MCAP").next_image().expect_err("no such camera").to_string();
+        assert!(absent.contains("/camera/cam7/compressed") && absent.contains("/camera/cam0/compressed"), "{absent}");
 
-    let rig = world.folder.join("rig");
-    std::fs::create_dir_all(&rig).expect("folder");
-    let camera = |name: &str| {
-        format!(
-            "[[camera]]\nname = \"{name}\"\nfx = 60.0\nfy = 60.0\ncx = 32.0\ncy = 24.0\ndistortion = [0.0, 0.0, 0.0, 0.0]\n\
+        let rig = world.folder.join("rig");
+        std::fs::create_dir_all(&rig).expect("folder");
+        let camera = |name: &str| {
+            format!(
+                "[[camera]]\nname = \"{name}\"\nfx = 60.0\nfy = 60.0\ncx = 32.0\ncy = 24.0\ndistortion = [0.0, 0.0, 0.0, 0.0]\n\
              chessboard_origin_mm = [0.0, 0.0, 0.0]\nchessboard_rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n"
-        )
-    };
-    let head = "resolution = [64, 48]\n[chessboard]\nsquare_mm = 9.0\ninner_corners = [8, 6]\n[fixture]\nball_offset_mm = 38.0\n\
+            )
+        };
+        let head = "resolution = [64, 48]\n[chessboard]\nsquare_mm = 9.0\ninner_corners = [8, 6]\n[fixture]\nball_offset_mm = 38.0\n\
                 ball_radius_mm = 20.0\nx_ball = \"green\"\ny_ball = \"yellow\"\nneg_x_ball = \"red\"\n";
-    std::fs::write(rig.join("rig.toml"), head.to_owned() + &camera("cam0") + &camera("cam1")).expect("file");
-    let scene = world.folder.join("scene");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
-    command.args(["vision", "record", "--frames-per-s", "20", "--rig"]).arg(&rig).arg("--out").arg(&scene);
-    command.args(["cam0", "cam1"].map(|name| format!("{name}={}", out.display()))).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let (code, text) = said(command.spawn().expect("runs"));
-    assert_eq!(code, Some(0), "{text}");
-    let frames = std::fs::read_to_string(scene.join("frames.csv")).expect("frames.csv");
-    let start: f64 =
-        frames.lines().next().and_then(|line| line.strip_prefix("# start_unix_s = ")).expect("start").parse().expect("s");
-    let first = ImageSource::open(&out, "cam0").expect("images").next_image().expect("image").expect("image").time_ns;
-    assert!((start - first as f64 / 1e9).abs() < 1.0, "{start} {first}");
-    assert!(frames.lines().count() > 10, "{frames}");
+        std::fs::write(rig.join("rig.toml"), head.to_owned() + &camera("cam0") + &camera("cam1")).expect("file");
+        let scene = world.folder.join("scene");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
+        command.args(["vision", "record", "--frames-per-s", "20", "--rig"]).arg(&rig).arg("--out").arg(&scene);
+        command
+            .args(["cam0", "cam1"].map(|name| format!("{name}={}", out.display())))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let (code, text) = said(command.spawn().expect("runs"));
+        assert_eq!(code, Some(0), "{text}");
+        let frames = std::fs::read_to_string(scene.join("frames.csv")).expect("frames.csv");
+        let start: f64 =
+            frames.lines().next().and_then(|line| line.strip_prefix("# start_unix_s = ")).expect("start").parse().expect("s");
+        let first = ImageSource::open(&out, "cam0").expect("images").next_image().expect("image").expect("image").time_ns;
+        assert!((start - first as f64 / 1e9).abs() < 1.0, "{start} {first}");
+        assert!(frames.lines().count() > 10, "{frames}");
+    });
 }
 
 #[test]
 fn a_webcam_that_fails_does_not_stop_the_recording() {
-    let world = World::new("fails");
-    let program = webcam(&world, "short", [64, 48], "5");
-    let out = world.folder.join("run.mcap");
-    let more = ["--ffmpeg", program.to_str().expect("UTF-8"), "--camera", "cam0=/dev/null"];
-    let (code, said, _) = world.recorded(&out, "3", &more);
-    assert!(code == Some(1) && said.contains("ended early: it ended by itself"), "{code:?} {said}");
-    let states = states_of(&out);
-    assert!(states.last().expect("states").source_time_ns - states[0].source_time_ns > 1_500_000_000);
+    despite_stops(|| {
+        let world = World::new("fails");
+        let program = webcam(&world, "short", [64, 48], "5");
+        let out = world.folder.join("run.mcap");
+        let more = ["--ffmpeg", program.to_str().expect("UTF-8"), "--camera", "cam0=/dev/null"];
+        let (code, said, _) = world.recorded(&out, "3", &more);
+        assert!(code == Some(1) && said.contains("ended early: it ended by itself"), "{code:?} {said}");
+        let states = states_of(&out);
+        assert!(states.last().expect("states").source_time_ns - states[0].source_time_ns > 1_500_000_000);
+    });
 }
 
 #[test]
