@@ -88,8 +88,11 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
         /// The truth is on the states' clock and in frame 0 already
-        #[arg(long)]
+        #[arg(long, conflicts_with = "offset_s")]
         same: bool,
+        /// When the truth's time 0 is on the states' clock, to 5 s; otherwise their start times say it, or they begin together
+        #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+        offset_s: Option<f64>,
     },
     /// Where a simulation and recordings differ, which physics is missing, how large it is, and the model with it
     Gap {
@@ -219,7 +222,7 @@ fn main() -> ExitCode {
         Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
-        Command::Pair { run, truth, out, same } => pair::run(&run, truth.as_deref(), &out, same),
+        Command::Pair { run, truth, out, same, offset_s } => pair::run(&run, truth.as_deref(), &out, same, offset_s),
         Command::Gap { real, sim, robot, out, seed, trace, watch } => {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch })
         }

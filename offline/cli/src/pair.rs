@@ -2,18 +2,30 @@
 
 use crate::{output, plot};
 use recordings::Recording;
-use recordings::pairs::{Options, Reported, Truth, pair};
+use recordings::pairs::{ClockChoice, Options, Reported, Truth, pair, stated_offset_s};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// `same`: the truth is on the states' clock and in frame 0 of the arm (a simulation, an earlier registration).
-pub(crate) fn run(run: &Path, truth: Option<&Path>, out: &Path, same: bool) -> Result<ExitCode, String> {
+/// `same`: the truth is on the states' clock and in frame 0 of the arm (a simulation, an earlier registration). `offset_s`: what is
+/// known of the clocks' offset; otherwise the two recordings' own start times, otherwise that they begin together.
+pub(crate) fn run(run: &Path, truth: Option<&Path>, out: &Path, same: bool, offset_s: Option<f64>) -> Result<ExitCode, String> {
+    if offset_s.is_some_and(|offset_s| !offset_s.is_finite()) {
+        return Err("--offset-s: must be a number of seconds".to_owned());
+    }
     let recording = plot::read(run)?;
     let separate = truth.map(plot::read).transpose()?;
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
     let frames = Truth::from_recording(separate.as_ref().unwrap_or(&recording)).map_err(|error| error.to_string())?;
-    let options = if same { Options::same_clock_and_frame() } else { Options::default() };
+    let mut options = if same { Options::same_clock_and_frame() } else { Options::default() };
+    if let ClockChoice::Fit { expected_offset_s, window_s, .. } = &mut options.clock {
+        let stated = || separate.as_ref().and_then(|truth| stated_offset_s(&recording, truth));
+        if let Some(found) = offset_s.or_else(stated) {
+            *expected_offset_s = found;
+            let source = if offset_s.is_some() { "as told" } else { "by the start times of both" };
+            say!("the truth's time 0 is at {found:.3} s of the states, {source}; searched {window_s} s to both sides");
+        }
+    }
     let paired = pair(&reported, &frames, &options).map_err(|error| format!("{}: {error}", run.display()))?;
     let text = table(&paired, &recording);
     output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;

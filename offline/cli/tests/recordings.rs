@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Folder, done, errors, ravenpose, refused, text, with_effect};
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Output;
 
@@ -91,6 +92,57 @@ fn pairs_of_a_simulated_run_are_its_error() {
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.file("pairs.report.json")).expect("report")).expect("JSON");
     assert_eq!(report["pairs"].as_u64(), Some(rows.len() as u64));
+}
+
+#[test]
+fn the_clocks_of_a_run_and_its_truth_are_found_by_their_start_times_or_as_told() {
+    let folder = Folder::new("clocks");
+    let out = folder.file("runs");
+    done(&["simulate", "--minutes", "0.4", "--seed", "4", "--out", text(&out)]);
+    let table = folder.file("table.csv");
+    done(&["convert", text(&out.join("run_0001.mcap")), text(&table)]);
+    let table = std::fs::read_to_string(table).expect("table");
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().expect("names").split(',').collect();
+    let at = ["t_s", "truth_x_mm", "truth_y_mm", "truth_z_mm"].map(|name| names.iter().position(|own| *own == name).expect(name));
+    // 20 frames a second, of a camera that began 9 s after the run; by the two computers' clocks it was 8.8 s.
+    let mut frames = String::from("t_s,x_mm,y_mm,z_mm\n");
+    for line in lines.clone().step_by(50) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let t_s: f64 = cells[at[0]].parse().expect("time");
+        if t_s >= 9.0 {
+            let _ = writeln!(frames, "{:.6},{},{},{}", t_s - 9.0, cells[at[1]], cells[at[2]], cells[at[3]]);
+        }
+    }
+    let states = format!("{}\n{}\n", names.join(","), lines.collect::<Vec<_>>().join("\n"));
+    let written = |name: &str, head: &str, rows: &str| {
+        let file = folder.file(name);
+        std::fs::write(&file, format!("{head}\n{rows}")).expect("table");
+        file
+    };
+    let run = written("run.csv", "# start_unix_ns = 1800000000000000000", &states);
+    let bare_run = written("bare.csv", "# robot = raven2", &states);
+    let seen = written("truth.csv", "# start_unix_s = 1800000008.800000", &frames);
+    let bare = written("bare_truth.csv", "# rig = ours", &frames);
+    let pairs = folder.file("pairs.csv");
+    let offset_s = |run: &Path, truth: &Path, more: &[&str]| {
+        let mut arguments = vec!["pair", text(run), "--truth", text(truth), "--out", text(&pairs)];
+        arguments.extend(more);
+        let words = String::from_utf8(done(&arguments).stdout).expect("UTF-8");
+        let report = std::fs::read(folder.file("pairs.report.json")).expect("report");
+        let report: serde_json::Value = serde_json::from_slice(&report).expect("JSON");
+        (report["clock"]["clock"]["offset_s"].as_f64().expect("offset"), words)
+    };
+    let (found, words) = offset_s(&run, &seen, &[]);
+    assert!((found - 9.0).abs() < 0.02 && words.contains("8.800 s of the states, by the start times"), "{found} {words}");
+    let (found, words) = offset_s(&bare_run, &bare, &["--offset-s", "12"]);
+    assert!((found - 9.0).abs() < 0.02 && words.contains("12.000 s of the states, as told"), "{found} {words}");
+    // With nothing known, 9 s are out of reach, and no other offset is taken for it.
+    for (run, truth) in [(&bare_run, &seen), (&run, &bare)] {
+        refused(&ravenpose(&["pair", text(run), "--truth", text(truth), "--out", text(&pairs)]), &[text(run)]);
+    }
+    let both = ravenpose(&["pair", text(&run), "--truth", text(&seen), "--out", text(&pairs), "--same", "--offset-s", "1"]);
+    assert_eq!(both.status.code(), Some(2));
 }
 
 #[test]

@@ -74,7 +74,14 @@ fn a_simulated_recording_is_rendered_measured_and_paired() {
     let words = done(&own.0, &render);
     assert!(words.contains("frames of 4 cameras"), "{words}");
     done(&own.0, &["vision", "calibrate", "seen", "--out", "cameras.toml"]);
-    done(&own.0, &["vision", "track", "--cameras", "cameras.toml", "seen", "--out", "truth.csv", "--overlay", "sheet"]);
+    // As `vision record` writes it: a second before the images are on the clock of the states, which simulated runs begin at 1.7e9 s.
+    let frames = own.text("seen/frames.csv");
+    std::fs::write(own.0.join("seen/frames.csv"), format!("# start_unix_s = soon\n{frames}")).expect("frames");
+    let track = ["vision", "track", "--cameras", "cameras.toml", "seen", "--out", "truth.csv", "--overlay", "sheet"];
+    refused(&own.0, &track, &["frames.csv", "line 1", "start_unix_s is 'soon'"]);
+    std::fs::write(own.0.join("seen/frames.csv"), format!("# start_unix_s = 1700000000.25\n{frames}")).expect("frames");
+    done(&own.0, &track);
+    assert!(own.text("truth.csv").starts_with("# start_unix_s = 1700000000.250000\nframe,t_s,"));
     assert!(own.text("sheet/index.html").contains("<svg"));
 
     let (found, wanted) = (positions(&own.text("truth.csv")), positions(&own.text("seen/truth.csv")));
@@ -89,7 +96,8 @@ fn a_simulated_recording_is_rendered_measured_and_paired() {
     let rms_mm = (square / found.len() as f64).sqrt();
     assert!(rms_mm < 0.4, "{rms_mm}");
 
-    done(&own.0, &["pair", "runs/run_0001.mcap", "--truth", "truth.csv", "--out", "pairs.csv"]);
+    let words = done(&own.0, &["pair", "runs/run_0001.mcap", "--truth", "truth.csv", "--out", "pairs.csv"]);
+    assert!(words.contains("is at 0.250 s of the states, by the start times"), "{words}");
     let (report, real) = (own.json("pairs.report.json"), own.json("seen/registration_true.json"));
     let offset_s = report["clock"]["clock"]["offset_s"].as_f64().expect("offset");
     assert!((offset_s - 1.2).abs() < 0.01, "{offset_s}");

@@ -145,14 +145,18 @@ pub fn write_truth(tracked: &Tracked, file: &Path) -> Result<()> {
 /// The columns of `truth.csv` by ball are named after its colours in this order where it has them (the contract's order).
 const ORDER: [&str; 3] = ["green", "yellow", "red"];
 
-/// Rows of `truth.csv`; pose cells of a lost frame are empty.
+/// Rows of `truth.csv`; pose cells of a lost frame are empty. `# start_unix_s` stands before them where the recording has it.
 pub fn truth_text(tracked: &Tracked) -> String {
     let mut order: Vec<usize> = ORDER.iter().filter_map(|name| tracked.balls.iter().position(|ball| ball == name)).collect();
     order.extend((0..3).filter(|k| !ORDER.contains(&tracked.balls[*k].as_str())));
-    let mut text = String::from("frame,t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz");
+    // Writing to a String cannot fail.
+    let mut text = String::new();
+    if let Some(start_unix_s) = tracked.start_unix_s {
+        let _ = writeln!(text, "# start_unix_s = {start_unix_s:.6}");
+    }
+    text.push_str("frame,t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz");
     for ball in &order {
         let name = &tracked.balls[*ball];
-        // Writing to a String cannot fail.
         let _ = write!(text, ",{name}_x_mm,{name}_y_mm,{name}_z_mm");
     }
     for ball in &order {

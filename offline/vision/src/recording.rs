@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::picture;
 use crate::rig::Rig;
-use crate::table::{FrameTime, read_frames};
+use crate::table::{FrameTime, Frames, read_frames};
 use image::RgbImage;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,8 @@ const BLACK: u8 = 24;
 pub struct Recording {
     /// Times of its frames.
     pub frames: Vec<FrameTime>,
+    /// When their time is 0, s since 1970, where it is known.
+    pub start_unix_s: Option<f64>,
     folder: PathBuf,
     names: Vec<String>,
     size_px: [u32; 2],
@@ -26,7 +28,7 @@ impl Recording {
     /// # Errors
     /// If the list of frames is not sound, or fewer than two cameras have images.
     pub fn open(rig: &Rig, folder: &Path) -> Result<Self> {
-        let frames = read_frames(&folder.join("frames.csv"))?;
+        let Frames { times, start_unix_s } = read_frames(&folder.join("frames.csv"))?;
         let names: Vec<String> = rig.cameras.iter().map(|camera| camera.name.clone()).collect();
         let images = folder.join("frames");
         let there = names.iter().filter(|name| images.join(name).is_dir()).count();
@@ -34,7 +36,7 @@ impl Recording {
             let what = format!("{there} of {} cameras have a folder of images", names.len());
             return Err(Error::content(&images, names.join(", "), what, "give frames/NAME/ for two cameras at least"));
         }
-        Ok(Self { frames, folder: images, names, size_px: rig.size_px })
+        Ok(Self { frames: times, start_unix_s, folder: images, names, size_px: rig.size_px })
     }
 
     /// Images of a frame by camera; `None` where one is missing or black, with what is to be said about it.

@@ -28,30 +28,42 @@ pub struct FrameTime {
     pub t_s: f64,
 }
 
+/// The frames of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Their numbers and times, rising.
+    pub times: Vec<FrameTime>,
+    /// When `t_s` is 0, s since 1970, where `# start_unix_s = ...` says so.
+    pub start_unix_s: Option<f64>,
+}
+
 /// Columns of a CSV file by name, with the line of each row.
 struct Rows {
+    /// `# key = value`, with the line.
+    metadata: Vec<(usize, String, String)>,
     header: Vec<String>,
-    rows: Vec<(usize, Vec<String>)>,
+    content: Vec<(usize, Vec<String>)>,
 }
 
 impl Rows {
     fn read(file: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(file).map_err(Error::read(file))?;
         let split = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
-        let mut lines = text
-            .lines()
-            .enumerate()
-            .map(|(k, line)| (k + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let numbered = || text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
+        let metadata = numbered().filter_map(|(number, line)| {
+            let (key, value) = line.strip_prefix('#')?.split_once('=')?;
+            Some((number, key.trim().to_owned(), value.trim().to_owned()))
+        });
+        let mut lines = numbered().filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         let header = lines.next().map(|(_, line)| split(line)).unwrap_or_default();
-        let rows: Vec<_> = lines.map(|(number, line)| (number, split(line))).collect();
-        for (number, cells) in &rows {
+        let content: Vec<_> = lines.map(|(number, line)| (number, split(line))).collect();
+        for (number, cells) in &content {
             if cells.len() != header.len() {
                 let what = format!("{} cells under {} names", cells.len(), header.len());
                 return Err(Error::content(file, format!("line {number}"), what, "give each column a cell"));
             }
         }
-        Ok(Self { header, rows })
+        Ok(Self { metadata: metadata.collect(), header, content })
     }
 
     fn column(&self, file: &Path, name: &str) -> Result<usize> {
@@ -93,7 +105,7 @@ pub fn read_objects(file: &Path, cameras: &[String], kind: &str) -> Result<Vec<P
     }
     let camera_at = rows.column(file, "camera")?;
     let mut picks: Vec<Pick> = Vec::new();
-    for (line, cells) in &rows.rows {
+    for (line, cells) in &rows.content {
         if kind_at.is_some_and(|k| cells[k] != kind) {
             continue;
         }
@@ -139,7 +151,7 @@ pub fn read_places(file: &Path) -> Result<Places> {
     let names = ["x_mm", "y_mm", "z_mm"];
     let at = [rows.column(file, names[0])?, rows.column(file, names[1])?, rows.column(file, names[2])?];
     let mut places = Places::new();
-    for (line, cells) in &rows.rows {
+    for (line, cells) in &rows.content {
         let mut v = [0.0; 3];
         for k in 0..3 {
             v[k] = number(file, *line, names[k], &cells[at[k]])? * 1e-3;
@@ -155,12 +167,14 @@ pub fn read_places(file: &Path) -> Result<Places> {
 /// Reads the frames of a recording.
 ///
 /// # Errors
-/// If a column is absent, a cell is no number, a frame stands twice, or time or number does not rise.
-pub fn read_frames(file: &Path) -> Result<Vec<FrameTime>> {
+/// If a column is absent, a cell or `# start_unix_s` is no number, a frame stands twice, or time or number does not rise.
+pub fn read_frames(file: &Path) -> Result<Frames> {
     let rows = Rows::read(file)?;
+    let start = rows.metadata.iter().find(|(_, key, _)| key == "start_unix_s");
+    let start_unix_s = start.map(|(line, key, value)| number(file, *line, key, value)).transpose()?;
     let (frame_at, time_at) = (rows.column(file, "frame")?, rows.column(file, "t_s")?);
     let mut frames: Vec<FrameTime> = Vec::new();
-    for (line, cells) in &rows.rows {
+    for (line, cells) in &rows.content {
         let place = format!("line {line}");
         let Ok(frame) = cells[frame_at].parse::<u64>() else {
             let what = format!("frame is '{}'", cells[frame_at]);
@@ -176,5 +190,5 @@ pub fn read_frames(file: &Path) -> Result<Vec<FrameTime>> {
     if frames.is_empty() {
         return Err(Error::content(file, "line 2", "no frames", "list the frames of the recording"));
     }
-    Ok(frames)
+    Ok(Frames { times: frames, start_unix_s })
 }

@@ -63,6 +63,8 @@ pub struct Tracked {
     pub balls: [String; 3],
     /// Exposure by which poses were moved back to the times of their frames, s.
     pub exposure_s: Option<f64>,
+    /// When the rows' time is 0, s since 1970, where the recording says so.
+    pub start_unix_s: Option<f64>,
 }
 
 /// Places of the work space that outlines may have, m from the point all cameras look at.
@@ -134,7 +136,7 @@ pub fn track(
         Mode::Default => timing::to_frame_times(&mut rows, &scene, &rig.timing),
         Mode::Paper => None,
     };
-    Ok(Tracked { rows, balls: fixture.balls.clone(), exposure_s })
+    Ok(Tracked { rows, balls: fixture.balls.clone(), exposure_s, start_unix_s: recording.start_unix_s })
 }
 
 /// Views of a frame; the points of their rims are many and needed of few frames only.

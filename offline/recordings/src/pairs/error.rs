@@ -48,7 +48,7 @@ pub enum PairError {
     /// The clocks do not overlap within the search window.
     #[error(
         "the states run from {state_from_s:.3} to {state_to_s:.3} s, the truth from {truth_from_s:.3} to {truth_to_s:.3} s: they do not meet \
-         within {window_s} s of the expected offset {expected_s} s; give the difference of the clocks as the expected offset"
+         within {window_s} s of the expected offset {expected_s} s; give the difference of the clocks as the expected offset (--offset-s)"
     )]
     NoOverlap {
         /// First state, s.

@@ -26,7 +26,7 @@ mod track;
 pub use drop::Reason;
 pub use error::PairError;
 pub use input::{Reported, Truth};
-pub use options::{ClockChoice, Limits, Options, OutlierLimits, RegistrationChoice};
+pub use options::{ClockChoice, Limits, Options, OutlierLimits, RegistrationChoice, stated_offset_s};
 pub use report::{ClockReport, Dropped, LabelReport, Motion, OrientationReport, RegistrationReport, Report};
 pub use rigid::Rigid;
 pub use sampler::{Interpolation, Sampler, sample};

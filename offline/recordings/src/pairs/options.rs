@@ -1,6 +1,7 @@
 //! What may be set, with the defaults.
 
 use super::{Clock, Rigid};
+use crate::Recording;
 
 /// Where the clock of the truth comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +58,21 @@ pub struct Limits {
     pub explained_min: f64,
     /// Least log-likelihood by which an offset must beat any other, nats.
     pub advantage_min_nats: f64,
+}
+
+const SEPTEMBER_2001_NS: i64 = 1_000_000_000_000_000_000;
+
+/// What the offset of the clocks is by the two recordings' own words, s: both say when their time is 0, on the wall clock.
+///
+/// `start_unix_ns` of states, which is a small number where their clock began with the run; of the truth, `start_unix_s` (`vision
+/// track`) is looked for as well. Only times after 2001 count.
+pub fn stated_offset_s(reported: &Recording, truth: &Recording) -> Option<f64> {
+    let start_ns = |recording: &Recording| {
+        let whole = || recording.metadata.get("start_unix_ns")?.parse::<i64>().ok();
+        let seconds = || Some((recording.metadata.get("start_unix_s")?.parse::<f64>().ok()? * 1e9) as i64);
+        whole().or_else(seconds).filter(|start_ns| *start_ns >= SEPTEMBER_2001_NS)
+    };
+    Some((start_ns(truth)? - start_ns(reported)?) as f64 / 1e9)
 }
 
 /// Everything that [`pair`](super::pair) may be told.

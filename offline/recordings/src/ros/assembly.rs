@@ -155,7 +155,7 @@ impl Assembler {
     /// Takes a message; `time_ns` is the one that the file gives it.
     pub(crate) fn take(&mut self, role: &Role, time_ns: u64, bytes: &[u8]) -> Result<(), MessageError> {
         match role {
-            Role::State(decoder) => self.take_state(decoder, bytes),
+            Role::State(decoder) => self.take_state(decoder, time_ns, bytes),
             Role::Origin => {
                 self.origin = Some(StateOrigin::decode(bytes)?);
                 Ok(())
@@ -184,16 +184,21 @@ impl Assembler {
         }
     }
 
-    fn take_state(&mut self, decoder: &StateDecoder, bytes: &[u8]) -> Result<(), MessageError> {
+    fn take_state(&mut self, decoder: &StateDecoder, time_ns: u64, bytes: &[u8]) -> Result<(), MessageError> {
         let mut state = decoder.decode(bytes)?;
         self.states += 1;
-        match self.origin.take() {
-            Some(origin) if origin.fits(&state) => origin.put_into(&mut state),
-            _ => {
-                state.seal(self.states);
-                let stamp_ns = StateOrigin::of(&state).header.time_ns();
-                state.source_time_ns = stamp_ns - *self.first_ns.get_or_insert(stamp_ns);
-            }
+        let origin = self.origin.take().filter(|origin| origin.fits(&state));
+        // A controller that leaves the header empty: then the file's time, as for all other messages.
+        if (state.hdr_stamp_sec, state.hdr_stamp_nsec) == (0, 0) {
+            state.hdr_stamp_sec = (time_ns / 1_000_000_000) as u32;
+            state.hdr_stamp_nsec = (time_ns % 1_000_000_000) as u32;
+        }
+        if let Some(origin) = origin {
+            origin.put_into(&mut state);
+        } else {
+            state.seal(self.states);
+            let stamp_ns = StateOrigin::of(&state).header.time_ns();
+            state.source_time_ns = stamp_ns - *self.first_ns.get_or_insert(stamp_ns);
         }
         self.arms = state.connected();
         self.end();
