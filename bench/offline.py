@@ -2,7 +2,7 @@
 
 Times the simulator in its process (times real time, step, accuracy), then `ravenpose simulate` and conversions as a user runs them:
 seconds, times real time, MB/s of input, peak resident memory. Tracking of four cameras stage by stage. `ravenpose gap` on
-runs of rising length; `--only gap` does that alone.
+runs of rising length; `--only gap` does that alone. `--out FILE` keeps what was printed.
 """
 import argparse
 import os
@@ -27,6 +27,28 @@ parameters = { f_c = 1.0 }
 """
 
 
+SAID = []
+
+
+def say(text):
+    print(text, flush=True)
+    SAID.append(text)
+
+
+def told(program):
+    """What a program prints."""
+    say(subprocess.run([program], check=True, stdout=subprocess.PIPE, text=True).stdout.rstrip())
+
+
+def keep(out):
+    """Writes what was said, whole or not at all."""
+    if out:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        beside = out.with_suffix(".new")
+        beside.write_text("\n".join(SAID) + "\n")
+        beside.rename(out)
+
+
 def run(arguments, good=0):
     """Seconds and peak resident memory in MiB of a child; ends the program if it does not end with the good status."""
     begun = time.monotonic()
@@ -41,7 +63,7 @@ def gap(folder):
     """A robot with dry friction that its simulation lacks: three joints, the whole library, all channels, 1 kHz."""
     robot = folder / "loose.toml"
     robot.write_text(LOOSE)
-    for minutes in [1.25, 2.5, 5.0]:
+    for minutes in [1.25, 5.0]:
         place = folder / f"gap-{minutes:g}"
         simulate = [BIN / "ravenpose", "simulate", "--robot"]
         run([*simulate, robot, "--minutes", str(minutes), "--seed", "3", "--out", place / "real"])
@@ -49,40 +71,48 @@ def gap(folder):
         run([*simulate, "raven2-nominal", "--commands", real, "--out", place / "sim"])
         # Status 1: a mismatch was found.
         seconds, memory = run([BIN / "ravenpose", "gap", "--real", real, "--sim", place / "sim/run_0001.mcap", "--out", place / "out"], 1)
-        print(f"gap, {minutes:g} min of one run with simulation: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time), peak {memory:.0f} MiB")
+        say(f"gap, {minutes:g} min of one run with simulation: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time), peak {memory:.0f} MiB")
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=140.0)
     parser.add_argument("--only", choices=["gap"])
+    parser.add_argument("--out", type=pathlib.Path)
     options = parser.parse_args()
     minutes = options.minutes
+    if options.out:
+        # What an earlier run left is not this one's.
+        options.out.unlink(missing_ok=True)
+    commit = subprocess.run(["git", "-C", ROOT, "describe", "--always", "--dirty"], stdout=subprocess.PIPE, text=True).stdout.strip()
+    say(f"{time.strftime('%Y-%m-%d %H:%M', time.gmtime())} UTC, commit {commit or 'unknown'}")
     if options.only is None:
-        subprocess.run([BIN / "examples/speed"], check=True)
-        subprocess.run([BIN / "examples/stages"], check=True)
+        told(BIN / "examples/speed")
+        told(BIN / "examples/stages")
     folder = pathlib.Path(tempfile.mkdtemp(prefix="ravenpose-bench."))
     try:
         gap(folder)
         if options.only == "gap":
+            keep(options.out)
             return
         seconds, memory = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--seed", "1", "--robot", "raven2-worn",
-                               "--run-minutes", "60", "--out", folder / "runs"])
+                               "--run-minutes", "20", "--out", folder / "runs"])
         runs = sorted((folder / "runs").glob("*.mcap"))
         size = sum(path.stat().st_size for path in runs)
-        print(f"simulate {minutes:g} min, one arm, worn, MCAP with truth: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time, "
+        say(f"simulate {minutes:g} min, one arm, worn, MCAP with truth: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time, "
               f"{os.cpu_count()} cores), {size / 1e6:.0f} MB, peak {memory:.0f} MiB")
         first = runs[0]
         # Messages: 980 bytes of state, 73 bytes of pose, about 230 bytes of joints per cycle, before compression.
         for target in ["copy.mcap", "copy.parquet", "copy.bag", "copy.csv"]:
             out = folder / target
             seconds, memory = run([BIN / "ravenpose", "convert", first, out])
-            print(f"convert {first.stat().st_size / 1e6:.0f} MB MCAP ({minutes * 60 / len(runs):.0f} s of states) to {target[5:]}: {seconds:.1f} s, "
+            say(f"convert {first.stat().st_size / 1e6:.0f} MB MCAP ({minutes * 60 / len(runs):.0f} s of states) to {target[5:]}: {seconds:.1f} s, "
                   f"{first.stat().st_size / 1e6 / seconds:.0f} MB/s of file, {minutes * 60e3 / len(runs) * 980 / 1e6 / seconds:.0f} MB/s of state messages, "
                   f"{out.stat().st_size / 1e6:.0f} MB written, peak {memory:.0f} MiB")
             out.unlink()
         seconds, memory = run([BIN / "ravenpose", "info", first])
-        print(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
+        say(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
+        keep(options.out)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -7,6 +7,7 @@ mod kernel;
 mod onnxruntime;
 mod page;
 mod path;
+mod svg;
 mod table;
 
 use ravenpose::{check, realtime};
@@ -77,7 +78,7 @@ fn main() -> ExitCode {
 }
 
 fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
-    let (runs, seconds) = if full { (10_000, 60) } else { (4_000, 50) };
+    let (runs, seconds) = (if full { 10_000 } else { 4_000 }, 40);
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let service_core = cores - 1;
     println!("{}; robot on core {ROBOT_CORE}, service on core {service_core}; every figure in us\n", page::machine());
@@ -94,7 +95,7 @@ fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
         }
     }
     if parts.means {
-        let table = path::means(service_core, 4, seconds / 4)?;
+        let table = path::means(service_core, 3, seconds / 4)?;
         println!("{table}");
         tables.push(table);
     }

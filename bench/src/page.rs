@@ -1,5 +1,6 @@
-//! `docs/performance.md` and `results.json`, from the tables of one run.
+//! `docs/performance.md` with its picture, and `results.json`, from the tables of one run.
 
+use crate::svg;
 use crate::table::Table;
 use serde_json::json;
 use std::fmt::Write as _;
@@ -7,7 +8,7 @@ use std::path::Path;
 
 const PAGE: &str = "# Performance
 
-Written by `make bench` (`ravenpose-bench full --write`), every table of it in one run of one machine. Such machines are shared and noisy:
+Written by `make bench`: every table by one run of `ravenpose-bench full --write`, the offline tools by `bench/offline.py` just before it. Such machines are shared and noisy:
 compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `sleep`, `spin`,
 `event`, `means`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
 
@@ -15,20 +16,34 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
 - *avx512vnni*: whole-number sums for i16 and i8, float32 otherwise; *avx2+fma*: float32 sums for all ([decision 0013](decisions/0013-small-weights.md)).
+- *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
 - The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth
   counts; beyond, the next one's.
 ";
 
-/// Writes both files; the page to `docs/performance.md`.
+/// What `bench/offline.py` printed, if it ran before.
+const OFFLINE: &str = "build/bench/offline.txt";
+
+/// Writes all of them; the page to `docs/performance.md`.
 pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
     let mut page = format!("{PAGE}\nMachine: {machine}.\n");
+    if let Some(picture) = tables.iter().find(|table| table.heading().contains("tight loop")).map(svg::bars) {
+        whole(Path::new("docs/performance.svg"), &picture)?;
+        page.push_str("\n![Median time of one run of the network, by engine and format](performance.svg)\n");
+    }
     for table in tables {
         let _ = write!(page, "\n## {}\n\n```text\n{table}```\n", table.heading());
     }
+    let offline = std::fs::read_to_string(OFFLINE).unwrap_or_default();
+    if !offline.is_empty() {
+        let _ = write!(page, "\n## Offline tools (`make bench-offline`)\n\n```text\n{offline}```\n");
+    }
     whole(Path::new("docs/performance.md"), &page)?;
     let tables: Vec<_> = tables.iter().map(Table::json).collect();
-    let results =
-        json!({ "schema": "ravenpose-bench/1", "machine": machine, "unit": "us unless a column says otherwise", "tables": tables });
+    let results = json!({
+        "schema": "ravenpose-bench/1", "machine": machine, "unit": "us unless a column says otherwise", "tables": tables,
+        "offline": offline.lines().collect::<Vec<_>>(),
+    });
     std::fs::create_dir_all("build/bench").map_err(|cause| format!("build/bench: {cause}"))?;
     whole(Path::new("build/bench/results.json"), &format!("{results:#}\n"))
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 const PERIOD_NS: i64 = 1_000_000;
 /// Answers later than this are given up: the next state is due.
 const PATIENCE_NS: i64 = 900_000;
-/// Wide: a machine that stops for a moment makes no pose uncorrected, so that each answer is one of the network.
+/// Wide: a machine that stops for a moment is to make no pose uncorrected.
 const LIMITS: &str = "[limits]\nstale_us = 1000000\nbudget_us = 100000\nlate_fallback = 1000\n";
 /// States before anything is measured: connecting, warming up, becoming valid.
 const WARM_UP: u64 = 1_500;
@@ -48,8 +48,11 @@ impl World {
             .stderr(log)
             .spawn()
             .map_err(|cause| format!("{}: {cause}; run make build", program.display()))?;
-        let world = Self { dir, settings, service };
+        let mut world = Self { dir, settings, service };
         for _ in 0..3000 {
+            if let Some(last_words) = world.ended() {
+                return Err(format!("ravenposed did not start: {last_words}"));
+            }
             if std::fs::read_to_string(world.dir.join("log")).is_ok_and(|log| log.contains("running")) {
                 return Ok(world);
             }
@@ -216,7 +219,10 @@ pub(crate) fn means(service_core: usize, rounds: usize, seconds: u64) -> Result<
     for round in 0..rounds {
         for turn in 0..MEANS.len() {
             let at = (turn + round) % MEANS.len();
-            let Some(mut found) = measure(MEANS[at].1, service_core, seconds)? else { continue };
+            let Some(mut found) = measure(MEANS[at].1, service_core, seconds)? else {
+                println!("note: {}: round {} of {rounds} not measured, the machine stopped for too long", MEANS[at].0, round + 1);
+                continue;
+            };
             match &mut all[at] {
                 Some(sum) => {
                     sum.whole.append(&mut found.whole);

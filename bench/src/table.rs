@@ -34,6 +34,11 @@ impl Table {
         self.title.split(", us").next().unwrap_or(&self.title)
     }
 
+    /// Name and first number of each row.
+    pub(crate) fn firsts(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.rows.iter().filter_map(|(name, values)| Some((name.trim(), *values.first()?)))
+    }
+
     /// Rows by name, cells by column; what was not measured is null.
     pub(crate) fn json(&self) -> serde_json::Value {
         let cells = |values: &[f64]| {
