@@ -74,13 +74,33 @@ def gap(folder):
         say(f"gap, {minutes:g} min of one run with simulation: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time), peak {memory:.0f} MiB")
 
 
+def recordings(folder, minutes):
+    """A long simulation, and its first run in every format."""
+    seconds, memory = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--seed", "1", "--robot", "raven2-worn",
+                           "--run-minutes", "20", "--out", folder / "runs"])
+    runs = sorted((folder / "runs").glob("*.mcap"))
+    size = sum(path.stat().st_size for path in runs)
+    say(f"simulate {minutes:g} min, one arm, worn, MCAP with truth: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time, "
+          f"{os.cpu_count()} cores), {size / 1e6:.0f} MB, peak {memory:.0f} MiB")
+    first = runs[0]
+    # Messages: 980 bytes of state, 73 bytes of pose, about 230 bytes of joints per cycle, before compression.
+    for target in ["copy.mcap", "copy.parquet", "copy.bag", "copy.csv"]:
+        out = folder / target
+        seconds, memory = run([BIN / "ravenpose", "convert", first, out])
+        say(f"convert {first.stat().st_size / 1e6:.0f} MB MCAP ({minutes * 60 / len(runs):.0f} s of states) to {target[5:]}: {seconds:.1f} s, "
+              f"{first.stat().st_size / 1e6 / seconds:.0f} MB/s of file, {minutes * 60e3 / len(runs) * 980 / 1e6 / seconds:.0f} MB/s of state messages, "
+              f"{out.stat().st_size / 1e6:.0f} MB written, peak {memory:.0f} MiB")
+        out.unlink()
+    seconds, memory = run([BIN / "ravenpose", "info", first])
+    say(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=140.0)
     parser.add_argument("--only", choices=["gap"])
     parser.add_argument("--out", type=pathlib.Path)
     options = parser.parse_args()
-    minutes = options.minutes
     if options.out:
         # What an earlier run left is not this one's.
         options.out.unlink(missing_ok=True)
@@ -92,29 +112,11 @@ def main():
     folder = pathlib.Path(tempfile.mkdtemp(prefix="ravenpose-bench."))
     try:
         gap(folder)
-        if options.only == "gap":
-            keep(options.out)
-            return
-        seconds, memory = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--seed", "1", "--robot", "raven2-worn",
-                               "--run-minutes", "20", "--out", folder / "runs"])
-        runs = sorted((folder / "runs").glob("*.mcap"))
-        size = sum(path.stat().st_size for path in runs)
-        say(f"simulate {minutes:g} min, one arm, worn, MCAP with truth: {seconds:.1f} s ({minutes * 60 / seconds:.0f} times real time, "
-              f"{os.cpu_count()} cores), {size / 1e6:.0f} MB, peak {memory:.0f} MiB")
-        first = runs[0]
-        # Messages: 980 bytes of state, 73 bytes of pose, about 230 bytes of joints per cycle, before compression.
-        for target in ["copy.mcap", "copy.parquet", "copy.bag", "copy.csv"]:
-            out = folder / target
-            seconds, memory = run([BIN / "ravenpose", "convert", first, out])
-            say(f"convert {first.stat().st_size / 1e6:.0f} MB MCAP ({minutes * 60 / len(runs):.0f} s of states) to {target[5:]}: {seconds:.1f} s, "
-                  f"{first.stat().st_size / 1e6 / seconds:.0f} MB/s of file, {minutes * 60e3 / len(runs) * 980 / 1e6 / seconds:.0f} MB/s of state messages, "
-                  f"{out.stat().st_size / 1e6:.0f} MB written, peak {memory:.0f} MiB")
-            out.unlink()
-        seconds, memory = run([BIN / "ravenpose", "info", first])
-        say(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
-        keep(options.out)
+        if options.only is None:
+            recordings(folder, options.minutes)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+    keep(options.out)
 
 
 if __name__ == "__main__":

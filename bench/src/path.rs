@@ -50,21 +50,28 @@ impl World {
             .map_err(|cause| format!("{}: {cause}; run make build", program.display()))?;
         let mut world = Self { dir, settings, service };
         for _ in 0..3000 {
-            if let Some(last_words) = world.ended() {
-                return Err(format!("ravenposed did not start: {last_words}"));
-            }
-            if std::fs::read_to_string(world.dir.join("log")).is_ok_and(|log| log.contains("running")) {
+            if world.log().contains("running") {
                 return Ok(world);
+            }
+            if world.ended() {
+                break;
             }
             std::thread::sleep(Duration::from_millis(20));
         }
-        Err(format!("ravenposed did not start: {}", std::fs::read_to_string(world.dir.join("log")).unwrap_or_default().trim()))
+        Err(format!("ravenposed did not start: {}", world.last_words()))
     }
 
-    /// The last words of a service that ended by itself.
-    fn ended(&mut self) -> Option<String> {
-        let _ = self.service.try_wait().ok()??;
-        Some(std::fs::read_to_string(self.dir.join("log")).unwrap_or_default().lines().last().unwrap_or_default().to_owned())
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.dir.join("log")).unwrap_or_default()
+    }
+
+    fn last_words(&self) -> String {
+        self.log().lines().last().unwrap_or_default().to_owned()
+    }
+
+    /// Has the service ended by itself?
+    fn ended(&mut self) -> bool {
+        matches!(self.service.try_wait(), Ok(Some(_)))
     }
 
     fn stop(&mut self) -> Option<Stats> {
@@ -133,16 +140,16 @@ const ATTEMPTS: u32 = 3;
 /// One service for `seconds`, with these lines in its `[loop]` table; none where it ended by itself in each attempt.
 fn measure(waiting: &str, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
     for _ in 0..ATTEMPTS {
-        match measure_once(waiting, service_core, seconds)? {
-            Ok(measured) => return Ok(Some(measured)),
-            Err(last_words) => println!("note: ravenposed ended by itself while it was measured: {last_words}"),
+        let measured = measure_once(waiting, service_core, seconds)?;
+        if measured.is_some() {
+            return Ok(measured);
         }
+        println!("note: ravenposed ended by itself while it was measured");
     }
     Ok(None)
 }
 
-/// The inner error: the service's last words, if it ended by itself.
-fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Result<Measured, String>, String> {
+fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
     let mut world = World::start(waiting, service_core)?;
     let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
     let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
@@ -171,21 +178,20 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Resu
                 }
                 None => missed += 1,
             }
-            if answer.is_none()
-                && let Some(last_words) = world.ended()
-            {
-                return Ok(Err(last_words));
+            if answer.is_none() && world.ended() {
+                println!("note: {}", world.last_words());
+                return Ok(None);
             }
         }
         // As a controller's timer does: what was missed is skipped, the phase is kept.
         next += PERIOD_NS * ((now_ns() - next) / PERIOD_NS + 1);
         sleep_until_ns(next);
     }
-    let Some(stats) = world.stop() else { return Ok(Err("no statistics".to_owned())) };
+    let Some(stats) = world.stop() else { return Ok(None) };
     if valid * 2 < whole.len() as u64 {
         return Err(format!("only {valid} of {} answers were valid: this measures fallback", whole.len()));
     }
-    Ok(Ok(Measured { whole, handed_over, missed, stats }))
+    Ok(Some(Measured { whole, handed_over, missed, stats }))
 }
 
 /// Measures one way of waiting for `seconds`; adds its rows to the table.

@@ -15,7 +15,7 @@ use recordings::stream::{Record, Sink};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Messages of each stream that may wait for the disk: eight seconds.
@@ -108,8 +108,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
     }
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
     let clock = Clock::start();
-    let (images, arrived) = sync_channel(webcams::WAITING_MAX);
-    let webcams = Webcams::open(cameras, clock, &images)?;
+    let (webcams, arrived) = Webcams::open(cameras, clock)?;
     let metadata = [("recorder", "ravenpose record"), ("clock", "wall clock at the start plus CLOCK_MONOTONIC since")];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let mut log = McapLog::create(out, &metadata).map_err(|error| error.to_string())?;

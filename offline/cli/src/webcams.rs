@@ -3,13 +3,13 @@
 use super::record::Clock;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use vision::video;
 
 /// Images that may wait for the disk, of all cameras: some 50 MB.
-pub(crate) const WAITING_MAX: usize = 256;
+const WAITING_MAX: usize = 256;
 /// A camera that has not begun by then is not there.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -81,8 +81,8 @@ pub(crate) struct Webcams {
 }
 
 impl Webcams {
-    /// Opens them all; each hands its images over from when [`Webcams::begin`] is called, and counts those for which there is no room.
-    pub(crate) fn open(wish: &Wish, clock: Clock, images: &SyncSender<Image>) -> Result<Self, String> {
+    /// Opens them all, and where their images come from when [`Webcams::begin`] is called; those for which there is no room are counted.
+    pub(crate) fn open(wish: &Wish, clock: Clock) -> Result<(Self, Receiver<Image>), String> {
         let size_px = size(&wish.image_size)?;
         if !(wish.frames_per_s >= 0.1 && wish.frames_per_s <= 1000.0) {
             return Err(format!("--frames-per-s {}: must be from 0.1 to 1000", wish.frames_per_s));
@@ -105,6 +105,7 @@ impl Webcams {
             named.push((name.to_owned(), PathBuf::from(path)));
         }
         let (begin, stop) = (Arc::default(), Arc::default());
+        let (images, arrived) = sync_channel(WAITING_MAX);
         // All at once: cameras take a second each to begin.
         let opening: Vec<_> = named
             .into_iter()
@@ -137,7 +138,7 @@ impl Webcams {
                 }
             }
         }
-        Ok(Self { all, clock, begin, stop })
+        Ok((Self { all, clock, begin, stop }, arrived))
     }
 
     /// From now on images are handed over.

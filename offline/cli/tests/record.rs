@@ -119,7 +119,7 @@ fn what_is_recorded_is_whole_and_in_order() {
         assert!(states.windows(2).all(|pair| pair[0].sequence < pair[1].sequence && pair[0].source_id == 77), "{said}");
         assert!(states.iter().all(|state| state.mpos[0] == state.sequence as f32));
         // Their header is empty: readers then go by the recorder's clock.
-        let header_ns = |state: &RavenState| i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
+        let header_ns = |state: &RavenState| Record::State(Box::new(*state)).time_ns();
         let ahead_ns = header_ns(&states[0]) - states[0].source_time_ns;
         assert!(states.iter().all(|state| header_ns(state) - state.source_time_ns == ahead_ns), "{ahead_ns}");
         assert!((ahead_ns - wall_clock_ahead_ns()).abs() < 2_000_000_000, "{ahead_ns}");

@@ -188,16 +188,14 @@ impl Assembler {
         let mut state = decoder.decode(bytes)?;
         self.states += 1;
         let origin = self.origin.take().filter(|origin| origin.fits(&state));
-        // A controller that leaves the header empty: then the file's time, as for all other messages.
-        if (state.hdr_stamp_sec, state.hdr_stamp_nsec) == (0, 0) {
-            state.hdr_stamp_sec = (time_ns / 1_000_000_000) as u32;
-            state.hdr_stamp_nsec = (time_ns % 1_000_000_000) as u32;
-        }
+        // As for all other messages; the origin knows the header as it came.
+        let header = stamped(StateOrigin::of(&state).header, time_ns);
+        (state.hdr_stamp_sec, state.hdr_stamp_nsec) = (header.stamp_sec, header.stamp_nsec);
         if let Some(origin) = origin {
             origin.put_into(&mut state);
         } else {
             state.seal(self.states);
-            let stamp_ns = StateOrigin::of(&state).header.time_ns();
+            let stamp_ns = header.time_ns();
             state.source_time_ns = stamp_ns - *self.first_ns.get_or_insert(stamp_ns);
         }
         self.arms = state.connected();
@@ -246,7 +244,12 @@ fn copy(field: &'static str, from: &[f64], to: &mut [f64; JOINTS]) -> Result<(),
     Ok(())
 }
 
-/// Time of a message: of its header, or where that was never set the file's.
+/// A header with a time: its own, or where that was never set the file's.
+fn stamped(header: Header, time_ns: u64) -> Header {
+    if header.stamp_sec == 0 && header.stamp_nsec == 0 { Header::at(header.seq, time_ns) } else { header }
+}
+
+/// Time of a message, ns since 1970.
 fn stamp(header: Header, time_ns: u64) -> i64 {
-    if header.stamp_sec == 0 && header.stamp_nsec == 0 { i64::try_from(time_ns).unwrap_or(i64::MAX) } else { header.time_ns() }
+    stamped(header, time_ns).time_ns()
 }
