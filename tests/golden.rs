@@ -205,3 +205,25 @@ fn odd_widths_are_padded_right_in_every_format_on_every_instruction_set() {
         }
     }
 }
+
+#[test]
+fn the_largest_sums_do_not_overflow_in_any_format_on_any_instruction_set() {
+    use ravenpose_importer::{Activation, Network};
+    // Every weight and every input as large as its format holds, of one sign and of alternating ones, over several blocks of a sum.
+    for inputs in [2, 511, 512, 513, 1301, 4000] {
+        for alternating in [false, true] {
+            let sign = |place: usize| if alternating && place % 2 == 1 { -1.0 } else { 1.0 };
+            let network = Network::dense(&[inputs, 17, 3], Activation::Identity, |place, wide| sign(place % wide));
+            let input: Vec<f32> = (0..inputs).map(|place| 3.0 * sign(place)).collect();
+            let truth = network.evaluate_f64(&input);
+            for mut plan in every_plan(&network) {
+                let mut output = [0.0_f32; 3];
+                plan.run(&input, &mut output);
+                for (found, truth) in output.iter().zip(&truth) {
+                    let error = (f64::from(*found) / truth - 1.0).abs();
+                    assert!(error < 1e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+                }
+            }
+        }
+    }
+}

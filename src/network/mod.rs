@@ -7,6 +7,8 @@ mod activation;
 mod deviation;
 mod format;
 mod instructions;
+#[cfg(target_arch = "x86_64")]
+mod pairs;
 mod rows;
 #[cfg(target_arch = "x86_64")]
 mod tiles;
@@ -17,6 +19,8 @@ pub use format::{Format, UnknownFormat};
 pub use instructions::InstructionSet;
 
 use instructions::{LANE, Lane, Line, bytes_of};
+#[cfg(target_arch = "x86_64")]
+use pairs::{Numbers, Pairs};
 use ravenpose_importer::{Activation, Dense, Network};
 use rows::Rows;
 #[cfg(target_arch = "x86_64")]
@@ -38,6 +42,8 @@ const MEAN_INPUTS: usize = 64;
 
 enum Weights {
     Rows(Rows),
+    #[cfg(target_arch = "x86_64")]
+    Pairs(Pairs),
     #[cfg(target_arch = "x86_64")]
     Tiles(Tiles),
 }
@@ -62,6 +68,8 @@ pub struct Plan {
     back: Box<[Lane]>,
     #[cfg(target_arch = "x86_64")]
     digits: Digits,
+    #[cfg(target_arch = "x86_64")]
+    numbers: Numbers,
     instruction_set: InstructionSet,
     format: Format,
     /// Where [`Plan::keep_warm`] goes on: layer and line.
@@ -132,6 +140,8 @@ impl Plan {
             back: zeros(widest),
             #[cfg(target_arch = "x86_64")]
             digits: Digits::new(widest),
+            #[cfg(target_arch = "x86_64")]
+            numbers: Numbers::new(widest),
             instruction_set,
             format,
             warm: (0, 0),
@@ -201,6 +211,8 @@ impl Plan {
             match &layer.weights {
                 Weights::Rows(rows) => rows.run(self.instruction_set, &layer.bias, &self.front, &mut self.back),
                 #[cfg(target_arch = "x86_64")]
+                Weights::Pairs(pairs) => pairs.run(&layer.bias, &self.front, &mut self.numbers, &mut self.back),
+                #[cfg(target_arch = "x86_64")]
                 Weights::Tiles(tiles) => tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back),
             }
             activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.lanes]);
@@ -232,8 +244,14 @@ impl Layer {
 impl Weights {
     fn new(weights: &[f32], inputs: usize, set: InstructionSet, format: Format) -> Self {
         #[cfg(target_arch = "x86_64")]
-        if set == InstructionSet::Avx512Vnni && matches!(format, Format::I16 | Format::I8) && inputs <= TILES_INPUTS_MAX {
-            return Self::Tiles(Tiles::new(weights, inputs, format));
+        if matches!(format, Format::I16 | Format::I8) {
+            match set {
+                InstructionSet::Portable => {}
+                InstructionSet::Avx512Vnni if inputs <= TILES_INPUTS_MAX => {
+                    return Self::Tiles(Tiles::new(weights, inputs, format));
+                }
+                _ => return Self::Pairs(Pairs::new(weights, inputs, format)),
+            }
         }
         let _ = set;
         Self::Rows(Rows::new(weights, inputs, format))
@@ -242,6 +260,8 @@ impl Weights {
     fn lines(&self) -> &[Line] {
         match self {
             Self::Rows(rows) => rows.lines(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Pairs(pairs) => pairs.lines(),
             #[cfg(target_arch = "x86_64")]
             Self::Tiles(tiles) => tiles.lines(),
         }

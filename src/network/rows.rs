@@ -131,8 +131,8 @@ mod x86 {
                 Format::F32 => wide_f32(rows, input, output),
                 Format::F16 => wide_f16(rows, input, output),
                 Format::Bf16 => wide_bf16(rows, input, output),
-                Format::I16 => wide_i16(rows, input, output),
-                Format::I8 => wide_i8(rows, input, output),
+                // Whole numbers have kernels of their own.
+                Format::I16 | Format::I8 => rows.portable(input, output),
             }
         }
     }
@@ -147,8 +147,7 @@ mod x86 {
                 Format::F32 => narrow_f32(rows, input, output),
                 Format::F16 => narrow_f16(rows, input, output),
                 Format::Bf16 => narrow_bf16(rows, input, output),
-                Format::I16 => narrow_i16(rows, input, output),
-                Format::I8 => narrow_i8(rows, input, output),
+                Format::I16 | Format::I8 => rows.portable(input, output),
             }
         }
     }
@@ -217,8 +216,6 @@ mod x86 {
     wide!(wide_f32, 4, |at| _mm512_load_ps(at.cast()));
     wide!(wide_f16, 2, |at| _mm512_cvtph_ps(_mm256_load_si256(at.cast())));
     wide!(wide_bf16, 2, |at| { _mm512_castsi512_ps(_mm512_slli_epi32::<16>(_mm512_cvtepu16_epi32(_mm256_load_si256(at.cast())))) });
-    wide!(wide_i16, 2, |at| _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_load_si256(at.cast()))));
-    wide!(wide_i8, 1, |at| _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(_mm_load_si128(at.cast()))));
 
     macro_rules! narrow {
         ($name:ident, $bytes:literal, |$at:ident| $load:expr) => {
@@ -259,6 +256,4 @@ mod x86 {
     narrow!(narrow_bf16, 2, |at| {
         _mm256_castsi256_ps(_mm256_slli_epi32::<16>(_mm256_cvtepu16_epi32(_mm_load_si128(at.cast()))))
     });
-    narrow!(narrow_i16, 2, |at| _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_load_si128(at.cast()))));
-    narrow!(narrow_i8, 1, |at| _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(at.cast()))));
 }
