@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-offline worn model prove prove-small faults fuzz lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-offline worn model prove prove-small faults fuzz lint clean
 
 all: build offline examples
 
@@ -88,6 +88,16 @@ bench-ci: build
 # Writes docs/performance.md and .svg, and build/bench/results.json.
 bench: build venv bench-offline
 	target/release/ravenpose-bench full --write
+
+# OpenVINO in the same tables, and the network as the published scripts run it (Keras): packages of 2 GB.
+bench-peers: build venv $(BUILD)/peers/.done
+	RAVENPOSE_BENCH_ONLY=kernel target/release/ravenpose-bench full
+	$(BUILD)/peers/bin/python3 bench/keras_predict.py --out $(BUILD)/bench/peers.txt
+
+$(BUILD)/peers/.done: bench/requirements-peers.txt venv
+	$(PYTHON3) -m venv $(BUILD)/peers
+	$(BUILD)/peers/bin/python3 -m pip install --quiet --disable-pip-version-check -r bench/requirements-peers.txt
+	touch $@
 
 # Simulator and recordings: times real time, MB/s, peak memory.
 bench-offline: offline

@@ -3,11 +3,12 @@
 //!
 //! This module contains `unsafe`: calls of functions compiled for an instruction set that was found on this machine, and flushing lines.
 
-use crate::onnxruntime;
 use crate::table::{Table, quantiles};
+use crate::{onnxruntime, openvino, wheel};
 use ravenpose::network::{Format, InstructionSet, Plan, choose};
 use ravenpose_importer::{Expected, Network, Oracle};
 use ravenpose_transport::{now_ns, sleep_until_ns};
+use std::path::Path;
 
 const ROUNDS: usize = 5;
 const WARM_UP: usize = 500;
@@ -22,6 +23,11 @@ fn stream(weights: &[u8]) -> u64 {
     if is_x86_feature_detected!("avx512f") {
         // SAFETY: the instruction set was found on this machine.
         return unsafe { stream_avx512(weights) };
+    }
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: as above.
+        return unsafe { stream_avx2(weights) };
     }
     let mut sums = [0_u64; 8];
     for line in weights.as_chunks::<64>().0 {
@@ -46,11 +52,30 @@ fn stream_avx512(weights: &[u8]) -> u64 {
     sums.into_iter().fold(0, |total, sum| total.wrapping_add(_mm512_reduce_add_epi64(sum).cast_unsigned()))
 }
 
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn stream_avx2(weights: &[u8]) -> u64 {
+    use std::arch::x86_64::{_mm256_add_epi64, _mm256_loadu_si256, _mm256_setzero_si256, _mm256_storeu_si256};
+    let mut sums = [_mm256_setzero_si256(); 8];
+    for lines in weights.as_chunks::<256>().0 {
+        for (sum, half) in sums.iter_mut().zip(lines.as_chunks::<32>().0) {
+            // SAFETY: half a line is 32 bytes.
+            *sum = _mm256_add_epi64(*sum, unsafe { _mm256_loadu_si256(half.as_ptr().cast()) });
+        }
+    }
+    let total = sums.into_iter().reduce(|a, b| _mm256_add_epi64(a, b)).unwrap_or(_mm256_setzero_si256());
+    let mut words = [0_u64; 4];
+    // SAFETY: four words are 32 bytes.
+    unsafe { _mm256_storeu_si256(words.as_mut_ptr().cast(), total) };
+    words.into_iter().fold(0, u64::wrapping_add)
+}
+
 /// Something that takes time.
 enum Engine {
     Floor(Box<Plan>),
     Plan(Box<Plan>),
     OnnxRuntime(Box<onnxruntime::Session>),
+    OpenVino(Box<openvino::Session>),
     Tract(Box<Oracle>),
 }
 
@@ -64,6 +89,7 @@ impl Engine {
                 output[0]
             }
             Self::OnnxRuntime(session) => session.run(input),
+            Self::OpenVino(session) => session.run(input),
             Self::Tract(oracle) => oracle.run(input).map_or(f32::NAN, |output| output[0]),
         }
     }
@@ -72,7 +98,7 @@ impl Engine {
     fn flush(&self) -> bool {
         match self {
             Self::Floor(plan) | Self::Plan(plan) => plan.memory().for_each(|bytes| flush(bytes.as_ptr(), bytes.len())),
-            Self::OnnxRuntime(_) | Self::Tract(_) => return false,
+            Self::OnnxRuntime(_) | Self::OpenVino(_) | Self::Tract(_) => return false,
         }
         true
     }
@@ -130,11 +156,11 @@ impl Contender {
 }
 
 /// Times every engine in turn, round by round, so that drift of the machine meets all alike; in the tight loop, and unless that is all
-/// that is wanted between sleeps and with flushed weights.
-pub(crate) fn run(bytes: &[u8], runs: usize, tight_only: bool) -> Result<Vec<Table>, String> {
+/// that is wanted between sleeps and with flushed weights. `model` is the file that holds `bytes`.
+pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> Result<Vec<Table>, String> {
     let expected = Expected { inputs: 118, outputs: 3 };
     let network = ravenpose_importer::import(bytes, &expected).map_err(|error| error.to_string())?;
-    let mut contenders = contenders(bytes, &network, &expected)?;
+    let mut contenders = contenders(bytes, model, &network, &expected)?;
     let mut sink = 0.0_f32;
     let mut tables = vec![deviations(&network)];
 
@@ -173,7 +199,7 @@ pub(crate) fn run(bytes: &[u8], runs: usize, tight_only: bool) -> Result<Vec<Tab
     Ok(tables)
 }
 
-fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Vec<Contender>, String> {
+fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected) -> Result<Vec<Contender>, String> {
     let usual = inputs(network);
     let mut all = Vec::new();
     let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
@@ -191,13 +217,19 @@ fn contenders(bytes: &[u8], network: &Network, expected: &Expected) -> Result<Ve
             }
         }
     }
-    match onnxruntime::library() {
+    match wheel::library("onnxruntime/capi", "libonnxruntime.so.") {
         Some(library) => {
             let session = onnxruntime::Session::open(&library, bytes, "ravenstate", "position_error", [118, 3])?;
             let name = format!("ONNX Runtime {}, C, bound memory", session.version);
             all.push(Contender::new(name, Engine::OnnxRuntime(Box::new(session)), 0, &usual));
         }
         None => println!("note: no ONNX Runtime to compare with; `make venv` installs it"),
+    }
+    // A large download: `make bench-peers` has it.
+    if let Some(library) = wheel::library("openvino/libs", "libopenvino_c.so") {
+        let session = openvino::Session::open(&library, model, 118)?;
+        let name = format!("OpenVINO {}, C, f32", session.version);
+        all.push(Contender::new(name, Engine::OpenVino(Box::new(session)), 0, &usual));
     }
     let oracle = Oracle::new(bytes, expected).map_err(|error| error.to_string())?;
     all.push(Contender::new("tract, kept state".to_owned(), Engine::Tract(Box::new(oracle)), 0, &usual));

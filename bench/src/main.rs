@@ -5,12 +5,15 @@
 mod growth;
 mod kernel;
 mod onnxruntime;
+mod openvino;
 mod page;
 mod path;
 mod svg;
 mod table;
+mod wheel;
 
 use ravenpose::{check, realtime};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 use table::Table;
@@ -123,7 +126,7 @@ fn network(parts: &Parts, core: usize, runs: usize) -> Result<Vec<Table>, String
         scope
             .spawn(|| {
                 let _ = realtime::pin(core);
-                let mut tables = kernel::run(&bytes, runs, parts.tight_only)?;
+                let mut tables = kernel::run(&bytes, Path::new(model), runs, parts.tight_only)?;
                 if parts.growth {
                     tables.extend(growth::run());
                 }

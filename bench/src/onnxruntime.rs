@@ -2,9 +2,10 @@
 //!
 //! This module contains `unsafe`: calls of that interface, whose declarations are those of `ort-sys`.
 
+use crate::wheel::Library;
 use ort_sys as sys;
 use std::ffi::{CStr, CString, c_char, c_void};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::ptr::{null, null_mut};
 
 /// The interface's version that is asked for; later libraries still have it.
@@ -21,19 +22,9 @@ pub(crate) struct Session {
     pub(crate) version: String,
 }
 
-/// The library of the Python package in the virtual environment that `make venv` makes.
-pub(crate) fn library() -> Option<PathBuf> {
-    let entries =
-        |path: &Path| std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path()).collect::<Vec<_>>();
-    let pythons = entries(Path::new("build/venv/lib"));
-    let folders = pythons.iter().map(|python| python.join("site-packages/onnxruntime/capi"));
-    let named = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("libonnxruntime.so."));
-    folders.flat_map(|folder| entries(&folder)).find(named)
-}
-
 impl Session {
     pub(crate) fn open(library: &Path, model: &[u8], input: &str, output: &str, widths: [usize; 2]) -> Result<Self, String> {
-        let path = CString::new(library.display().to_string()).map_err(|cause| cause.to_string())?;
+        let library = Library::open(library)?;
         let names = [CString::new(input), CString::new(output)].map(|name| name.map_err(|cause| cause.to_string()));
         let [input_name, output_name] = names;
         let (input_name, output_name) = (input_name?, output_name?);
@@ -41,12 +32,7 @@ impl Session {
         // SAFETY: the library is the one of the package, whose entry point has this type; every pointer that is passed lives until the
         // end of the process or of the call, and every status is looked at before the results are used.
         unsafe {
-            let handle = libc::dlopen(path.as_ptr(), libc::RTLD_NOW | libc::RTLD_LOCAL);
-            let entry = if handle.is_null() { null_mut() } else { libc::dlsym(handle, c"OrtGetApiBase".as_ptr()) };
-            if entry.is_null() {
-                return Err(format!("{}: cannot be opened", library.display()));
-            }
-            let entry: unsafe extern "system" fn() -> *const sys::OrtApiBase = std::mem::transmute(entry);
+            let entry: unsafe extern "system" fn() -> *const sys::OrtApiBase = library.function(c"OrtGetApiBase")?;
             let base = &*entry();
             let version = CStr::from_ptr((base.GetVersionString)()).to_string_lossy().into_owned();
             let api = (base.GetApi)(API_VERSION).as_ref().ok_or("the library is older than its interface 17")?;

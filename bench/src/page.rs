@@ -15,14 +15,16 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
-- *avx512vnni*: whole-number sums for i16 and i8, float32 otherwise; *avx2+fma*: float32 sums for all ([decision 0013](decisions/0013-small-weights.md)).
+- *avx512vnni*, *avx2+fma*: whole-number sums for i16 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
+- OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
 - *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
 - The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth
   counts; beyond, the next one's.
 ";
 
-/// What `bench/offline.py` printed, if it ran before.
+/// What other programs printed, if they ran before.
 const OFFLINE: &str = "build/bench/offline.txt";
+const PEERS: &str = "build/bench/peers.txt";
 
 /// Writes all of them; the page to `docs/performance.md`.
 pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
@@ -34,15 +36,19 @@ pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
     for table in tables {
         let _ = write!(page, "\n## {}\n\n```text\n{table}```\n", table.heading());
     }
-    let offline = std::fs::read_to_string(OFFLINE).unwrap_or_default();
-    if !offline.is_empty() {
-        let _ = write!(page, "\n## Offline tools (`make bench-offline`)\n\n```text\n{offline}```\n");
+    let [offline, peers] = [OFFLINE, PEERS].map(|path| std::fs::read_to_string(path).unwrap_or_default());
+    for (heading, said) in
+        [("As the published scripts run it (`make bench-peers`)", &peers), ("Offline tools (`make bench-offline`)", &offline)]
+    {
+        if !said.is_empty() {
+            let _ = write!(page, "\n## {heading}\n\n```text\n{said}```\n");
+        }
     }
     whole(Path::new("docs/performance.md"), &page)?;
     let tables: Vec<_> = tables.iter().map(Table::json).collect();
     let results = json!({
         "schema": "ravenpose-bench/1", "machine": machine, "unit": "us unless a column says otherwise", "tables": tables,
-        "offline": offline.lines().collect::<Vec<_>>(),
+        "offline": offline.lines().collect::<Vec<_>>(), "peers": peers.lines().collect::<Vec<_>>(),
     });
     std::fs::create_dir_all("build/bench").map_err(|cause| format!("build/bench: {cause}"))?;
     whole(Path::new("build/bench/results.json"), &format!("{results:#}\n"))
