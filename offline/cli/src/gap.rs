@@ -4,7 +4,7 @@ use crate::output;
 use ::gap::analysis::{Given, Options, Outcome, analyse};
 use ::gap::needed::keep_needed;
 use ::gap::search::Thresholds;
-use ::gap::verdicts::sha256;
+use ::gap::verdicts::{sha256, sha256_of};
 use ::gap::watch;
 use arm::Side;
 use gap_report::Status;
@@ -185,6 +185,6 @@ fn name(path: &Path, k: usize, all: &[PathBuf]) -> String {
 }
 
 fn hash(path: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(path).map_err(|error| format!("{}: cannot be read: {error}", path.display()))?;
-    Ok(sha256(&bytes))
+    let hash = std::fs::File::open(path).and_then(sha256_of);
+    hash.map_err(|error| format!("{}: cannot be read: {error}", path.display()))
 }

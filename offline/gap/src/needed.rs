@@ -8,32 +8,38 @@ const QUANTITIES: [&str; 12] = ["t_s", "mpos", "mvel", "jpos", "jpos_d", "jvel",
 /// Truths that are looked at.
 const TRUTHS: [&str; 4] = ["truth_jpos", "truth_x_m", "truth_y_m", "truth_z_m"];
 
-/// Drops the columns that neither the engine nor the simulator behind it reads: of a RAVEN-II a third.
+/// Drops the columns that neither the engine nor the simulator behind it reads: of a RAVEN-II two thirds.
 pub fn keep_needed(recording: &mut Recording, model: &RobotModel) {
     let recorded = |name: &str| recording.column(name).is_some_and(|values| values.iter().any(|x| x.is_finite()));
     let counts = !(1..=model.joint_count()).all(|joint| recorded(&format!("tau_{joint}_nm")));
     let forces = model.drives().iter().any(|drive| drive.connection == Connection::Force);
-    let needed = |name: &str| match quantity(name) {
-        "dac" => counts,
-        "jvel" => forces,
-        quantity => QUANTITIES.contains(&quantity) || TRUTHS.contains(&quantity),
+    let needed = |name: &str| {
+        let (quantity, joint) = quantity(name);
+        let wanted = match quantity {
+            "dac" => counts,
+            "jvel" => forces,
+            quantity => QUANTITIES.contains(&quantity) || TRUTHS.contains(&quantity),
+        };
+        // A RAVEN-II's recording has the joints of the tool as well. Of other robots, joints that the model lacks are a warning.
+        wanted && joint.is_none_or(|joint| joint <= model.joint_count() || model.as_raven().is_none())
     };
     let mapped = |name: &str| model.columns.iter().any(|column| column.source == name);
     recording.columns.retain(|column| needed(&column.name) || mapped(&column.name));
     recording.texts.clear();
 }
 
-/// A name up to the number of the joint.
-fn quantity(name: &str) -> &str {
-    let number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+/// A name up to the number of the joint, and that number.
+fn quantity(name: &str) -> (&str, Option<usize>) {
     let mut start = 0;
     for part in name.split('_') {
-        if start > 0 && number(part) {
-            return &name[..start - 1];
+        if start > 0
+            && let Ok(joint) = part.parse()
+        {
+            return (&name[..start - 1], Some(joint));
         }
         start += part.len() + 1;
     }
-    name
+    (name, None)
 }
 
 #[cfg(test)]
@@ -52,7 +58,19 @@ mod tests {
     fn what_nobody_reads_is_dropped() {
         let read =
             ["t_s", "mpos_1_rad", "jpos_d_3_m", "q_des_2", "tau_1_nm", "tau_2_nm", "tau_3_nm", "truth_jpos_1_rad", "truth_x_m"];
-        let not = ["dac_1_counts", "jvel_1_rad_s", "truth_qw", "truth_cable_1_n", "x_m", "runlevel", "ori_r1c1"];
+        let not = [
+            "dac_1_counts",
+            "jvel_1_rad_s",
+            "truth_qw",
+            "truth_cable_1_n",
+            "x_m",
+            "runlevel",
+            "ori_r1c1",
+            "mpos_4_rad",
+            "jpos_7_rad",
+            "tau_5_nm",
+            "truth_jpos_5_rad",
+        ];
         assert_eq!(kept(&[&read[..], &not[..]].concat()), read);
     }
 

@@ -569,13 +569,30 @@ fn remaining(found: &Found) -> Remaining {
 
 /// Hash of bytes in lower-case hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
+    // Bytes in memory can be read.
+    sha256_of(bytes).unwrap_or_default()
+}
+
+/// Hash of what a reader gives, to its end, in lower-case hexadecimal digits.
+///
+/// # Errors
+/// The reader's.
+pub fn sha256_of(mut reader: impl std::io::Read) -> std::io::Result<String> {
+    use sha2::{Digest, Sha256};
     use std::fmt::Write as _;
 
-    use sha2::{Digest, Sha256};
-    Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {
+    let mut hash = Sha256::new();
+    let mut room = vec![0; 1 << 16];
+    loop {
+        match reader.read(&mut room)? {
+            0 => break,
+            read => hash.update(&room[..read]),
+        }
+    }
+    Ok(hash.finalize().iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
         text
-    })
+    }))
 }
 
 /// For signatures that need nothing else.
