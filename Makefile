@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-offline worn model prove prove-small faults fuzz lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-soak bench-offline worn model prove prove-small faults fuzz lint clean
 
 all: build offline examples
 
@@ -88,6 +88,12 @@ bench-ci: build
 # Writes docs/performance.md and .svg, and build/bench/results.json.
 bench: build venv bench-offline
 	target/release/ravenpose-bench full --write
+
+# Half an hour of the service with memory and disk busy, 100 idle clients and faults in what it is sent; fails on a wrong answer, a loss
+# or a page fault. SOAK_MINUTES=N for another time.
+SOAK_MINUTES ?= 30
+bench-soak: build
+	target/release/ravenpose-bench soak $(SOAK_MINUTES)
 
 # OpenVINO in the same tables, and the network as the published scripts run it (Keras): packages of 2 GB.
 bench-peers: build venv $(BUILD)/peers/.done

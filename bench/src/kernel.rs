@@ -210,8 +210,10 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
         let title = format!("floor: read {:.2} MB once", read.bytes() as f64 / 1e6);
         all.push(Contender::new(title, Engine::Floor(Box::new(read)), floor, &usual));
         for &format in formats {
-            let sets = [InstructionSet::best(), InstructionSet::Avx2, InstructionSet::Portable];
-            for set in &sets[..if format == Format::I16 { 3 } else { 2 }] {
+            let mut sets = vec![InstructionSet::best(), InstructionSet::Avx2.available()];
+            sets.extend((format == Format::I16).then_some(InstructionSet::Portable));
+            sets.dedup();
+            for set in &sets {
                 let plan = Plan::with(network, *set, format);
                 all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
             }

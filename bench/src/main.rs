@@ -8,6 +8,7 @@ mod onnxruntime;
 mod openvino;
 mod page;
 mod path;
+mod soak;
 mod svg;
 mod table;
 mod wheel;
@@ -65,13 +66,19 @@ fn main() -> ExitCode {
         ["ci"] => (false, false),
         ["full"] => (true, false),
         ["full", "--write"] => (true, true),
+        ["soak"] => return ended(soak("30")),
+        ["soak", minutes] => return ended(soak(minutes)),
         _ => {
-            eprintln!("usage: ravenpose-bench ci|full [--write] (from the repository's top)");
+            eprintln!("usage: ravenpose-bench ci|full [--write]|soak [MINUTES] (from the repository's top)");
             return ExitCode::from(2);
         }
     };
     let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
-    match Parts::wanted(full, only.as_deref()).and_then(|parts| measure(&parts, full, write)) {
+    ended(Parts::wanted(full, only.as_deref()).and_then(|parts| measure(&parts, full, write)))
+}
+
+fn ended(done: Result<(), String>) -> ExitCode {
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("ravenpose-bench: {message}");
@@ -80,22 +87,41 @@ fn main() -> ExitCode {
     }
 }
 
+/// The service for long, under load, with clients that never read, and faults.
+fn soak(minutes: &str) -> Result<(), String> {
+    let wanted = minutes.parse().ok().filter(|minutes| (1..=24 * 60).contains(minutes));
+    let wanted = wanted.ok_or_else(|| format!("soak {minutes}: must be minutes from 1 to 1440"))?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    println!("{}; robot and load on core {ROBOT_CORE}, service on core {}", page::machine(cores), cores - 1);
+    // Before this thread gets a core and a priority, which its threads would have as well.
+    let load = soak::Load::new(ROBOT_CORE)?;
+    become_the_robot();
+    let table = soak::run(wanted, load, cores - 1, SERVICE_PRIORITY)?;
+    println!("\n{table}");
+    Ok(())
+}
+
+/// Memory, core and priority of a control process, as far as the machine gives them.
+fn become_the_robot() {
+    let missing = [realtime::lock_memory(), realtime::pin(ROBOT_CORE), realtime::set_fifo(ROBOT_PRIORITY)];
+    for missing in missing.into_iter().filter_map(Result::err) {
+        println!("note: {missing}");
+    }
+}
+
 fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
     let (runs, seconds) = (if full { 10_000 } else { 4_000 }, 40);
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let service_core = cores - 1;
-    println!("{}; robot on core {ROBOT_CORE}, service on core {service_core}; every figure in us\n", page::machine());
+    // Before this thread is pinned: it then knows of one core.
+    let machine = page::machine(cores);
+    println!("{machine}; robot on core {ROBOT_CORE}, service on core {service_core}; every figure in us\n");
     let mut tables = Vec::new();
     if parts.kernel {
         tables = network(parts, service_core, runs)?;
     }
     if parts.means || !parts.waits.is_empty() {
-        for missing in [realtime::lock_memory(), realtime::pin(ROBOT_CORE), realtime::set_fifo(ROBOT_PRIORITY)]
-            .into_iter()
-            .filter_map(Result::err)
-        {
-            println!("note: {missing}");
-        }
+        become_the_robot();
     }
     if parts.means {
         let table = path::means(service_core, 3, seconds / 4)?;
@@ -106,15 +132,15 @@ fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
         let table = through_shared_memory(&parts.waits, service_core, seconds)?;
         println!("{table}");
         let found = |name: &str| table.find(name).map_or(f64::NAN, |row| row[2]);
-        let (reached, machine) = (found("    input_to_output"), found(BASELINE));
+        let (reached, woken) = (found("    input_to_output"), found(BASELINE));
         println!(
             "input to output, {}: p99.9 {reached:.1} us (wanted below {INPUT_TO_OUTPUT_US} us on a quiet machine), {:.1} x the machine's own wake-up p99.9",
             parts.waits[0],
-            reached / machine
+            reached / woken
         );
         tables.push(table);
     }
-    if write { page::write(&tables, &page::machine()) } else { Ok(()) }
+    if write { page::write(&tables, &machine) } else { Ok(()) }
 }
 
 /// The network beside its peers, and its growth; an error if it is not fast enough beside tract.

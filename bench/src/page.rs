@@ -61,13 +61,12 @@ fn whole(path: &Path, text: &str) -> Result<(), String> {
 }
 
 /// Processor and kernel, as the machine names them.
-pub(crate) fn machine() -> String {
+pub(crate) fn machine(cores: usize) -> String {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let cpu = read("/proc/cpuinfo");
     let name = cpu
         .lines()
         .find_map(|line| line.strip_prefix("model name"))
         .map_or("unknown processor", |rest| rest.trim_start_matches([' ', '\t', ':']));
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     format!("{name}, {cores} cores, Linux {}", read("/proc/sys/kernel/osrelease").trim())
 }

@@ -11,22 +11,24 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::Duration;
 
-const PERIOD_NS: i64 = 1_000_000;
+pub(crate) const PERIOD_NS: i64 = 1_000_000;
+/// Name of the thread whose faults count, as /proc has it.
+const LOOP_THREAD: &str = "(ravenpose-loop)";
 /// Answers later than this are given up: the next state is due.
 const PATIENCE_NS: i64 = 900_000;
 /// Wide: a machine that stops for a moment is to make no pose uncorrected.
 const LIMITS: &str = "[limits]\nstale_us = 1000000\nbudget_us = 100000\nlate_fallback = 1000\n";
 /// States before anything is measured: connecting, warming up, becoming valid.
-const WARM_UP: u64 = 1_500;
+pub(crate) const WARM_UP: u64 = 1_500;
 
-struct World {
+pub(crate) struct World {
     dir: PathBuf,
-    settings: Settings,
+    pub(crate) settings: Settings,
     service: Child,
 }
 
 impl World {
-    fn start(waiting: &str, core: usize) -> Result<Self, String> {
+    pub(crate) fn start(waiting: &str, core: usize) -> Result<Self, String> {
         let dir = std::env::temp_dir().join(format!("ravenpose-bench-{}", std::process::id()));
         std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
         let settings = Settings { prefix: format!("rpbench{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
@@ -65,7 +67,7 @@ impl World {
         std::fs::read_to_string(self.dir.join("log")).unwrap_or_default()
     }
 
-    fn last_words(&self) -> String {
+    pub(crate) fn last_words(&self) -> String {
         self.log().lines().last().unwrap_or_default().to_owned()
     }
 
@@ -74,7 +76,17 @@ impl World {
         matches!(self.service.try_wait(), Ok(Some(_)))
     }
 
-    fn stop(&mut self) -> Option<Stats> {
+    /// Page faults of the loop's thread so far; none where the kernel does not say.
+    pub(crate) fn loop_faults(&self) -> Option<u64> {
+        let threads = std::fs::read_dir(format!("/proc/{}/task", self.service.id())).ok()?;
+        let mut stats = threads.flatten().filter_map(|thread| std::fs::read_to_string(thread.path().join("stat")).ok());
+        let of_loop = stats.find_map(|stat| stat.split_once(LOOP_THREAD).map(|(_, rest)| rest.to_owned()))?;
+        // After the name: state, six numbers, then minor faults, those of children, major ones.
+        let fields: Vec<&str> = of_loop.split_whitespace().collect();
+        Some(fields.get(7)?.parse::<u64>().ok()? + fields.get(9)?.parse::<u64>().ok()?)
+    }
+
+    pub(crate) fn stop(&mut self) -> Option<Stats> {
         // SAFETY: a signal to our own child, which was not waited for yet.
         unsafe { libc::kill(self.service.id() as i32, libc::SIGTERM) };
         let _ = self.service.wait();
@@ -99,7 +111,7 @@ fn remove(dir: &Path, prefix: &str) {
     }
 }
 
-fn state(sequence: u64) -> RavenState {
+pub(crate) fn state(sequence: u64) -> RavenState {
     let mut state = RavenState::new();
     state.arms = 1;
     state.runlevel = 3;
