@@ -227,3 +227,28 @@ fn the_largest_sums_do_not_overflow_in_any_format_on_any_instruction_set() {
         }
     }
 }
+
+#[test]
+fn rows_of_zeros_and_of_one_weight_are_right_in_every_format_on_every_instruction_set() {
+    use ravenpose_importer::{Activation, Network};
+    for inputs in [118, 600, 4000] {
+        // Output 0 has no weight, output 1 one, output 2 every seventh.
+        let weight = |place: usize, wide: usize| match (place / wide, place % wide) {
+            (1, column) if column == wide / 2 => 0.5,
+            (2, column) if column % 7 == 0 => 0.25,
+            _ => 0.0,
+        };
+        let mut network = Network::dense(&[inputs, 3], Activation::Identity, weight);
+        network.layers[0].bias = vec![1.5, -2.0, 0.25];
+        let input: Vec<f32> = (0..inputs).map(|place| (place as f32 * 0.37).sin()).collect();
+        let truth = network.evaluate_f64(&input);
+        for mut plan in every_plan(&network) {
+            let mut output = [0.0_f32; 3];
+            plan.run(&input, &mut output);
+            for (found, truth) in output.iter().zip(&truth) {
+                let error = (f64::from(*found) - truth).abs() / truth.abs().max(1.0);
+                assert!(error < 1e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+            }
+        }
+    }
+}

@@ -19,10 +19,11 @@ const DEPTH: usize = 2;
 const WIDTH: usize = 4;
 /// Numbers in a register.
 const HALF: usize = LANE / 2;
-/// Pairs of products that are summed in whole numbers: as many of one byte by two certainly fit in 32 bits, `2^31 / (2 * 127 * 32639)`.
+/// Pairs of products that are summed in whole numbers: as many certainly fit in 32 bits, of one byte by two (`2^31 / (2 * 127 * 32639)`)
+/// as of two by two, shifted (`2^31 / (2 * 32639^2 / 2^SHIFT)`, which is 258).
 const BLOCK: usize = 256;
-/// Two products of two bytes fill 32 bits: they lose their last bits before they are summed, which is far less than rounding the weights
-/// did.
+/// Two products of two bytes fill 32 bits: they lose their last bits before they are summed. That rounds down, by a half on average where
+/// they are not 0, and is less than what rounding the weights does.
 const SHIFT: i32 = 8;
 
 /// Activations as whole numbers of two bytes, for [`Pairs::run`].
@@ -81,6 +82,8 @@ pub(super) struct Pairs {
     /// Tiles side by side in the whole layer.
     across: usize,
     two: bool,
+    /// What each sum starts from, by output: what shifting takes off on average.
+    start: Box<[Lane]>,
     scale: Box<[Lane]>,
 }
 
@@ -92,11 +95,15 @@ impl Pairs {
         let outputs = weights.len() / inputs.max(1);
         let (groups, tiles) = (inputs.div_ceil(DEPTH), outputs.div_ceil(LANE));
         let mut lines = vec![Line([0; 64]); (groups * tiles * LANE * DEPTH * bytes).div_ceil(64)].into_boxed_slice();
-        let mut scale = super::zeros(tiles);
+        let (mut start, mut scale) = (super::zeros(tiles), super::zeros(tiles));
         for (row, weights) in weights.chunks_exact(inputs.max(1)).enumerate() {
             let row_scale = format.row_scale(weights);
             let (tile, place) = (row / LANE, row % LANE);
             scale[tile].0[place] = if bytes == 2 { row_scale * (1 << SHIFT) as f32 } else { row_scale };
+            if bytes == 2 {
+                let numbers = |pair: &[f32]| pair.iter().any(|weight| format.round(*weight, row_scale) != 0);
+                start[tile].0[place] = 0.5 * weights.chunks(DEPTH).filter(|pair| numbers(pair)).count() as f32;
+            }
             let panel = tile / WIDTH * WIDTH;
             let side_by_side = (tiles - panel).min(WIDTH);
             for (column, weight) in weights.iter().enumerate() {
@@ -105,7 +112,7 @@ impl Pairs {
                 lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&format.encode(*weight, row_scale)[..bytes]);
             }
         }
-        Self { lines, groups, across: tiles, two: bytes == 2, scale }
+        Self { lines, groups, across: tiles, two: bytes == 2, start, scale }
     }
 
     pub(super) fn lines(&self) -> &[Line] {
@@ -157,17 +164,16 @@ impl Pairs {
     ) {
         const REGISTER: usize = HALF * DEPTH;
         // SAFETY: `run_avx2` checked the lengths and `new` made them: `groups` pairs of activations, `groups * N` tiles from the panel's
-        // first, a scale for each; every load of weights is at a multiple of its own size from an aligned address.
+        // first, a start and a scale for each; every load of weights is at a multiple of its own size from an aligned address.
         unsafe {
             let x = numbers.lines.as_ptr().cast::<i32>();
             let mut w = self.lines.as_ptr().cast::<u8>().add(first * self.groups * 2 * REGISTER * BYTES);
-            let mut sums = [[_mm256_setzero_ps(); 2]; N];
+            let start = |tile: usize, half: usize| _mm256_load_ps(self.start[first + tile].0.as_ptr().add(half * HALF));
+            let mut sums: [[__m256; 2]; N] = std::array::from_fn(|tile| [start(tile, 0), start(tile, 1)]);
             let mut group = 0;
             while group < self.groups {
                 let end = (group + BLOCK).min(self.groups);
-                // A shift rounds down: by a half on average, which the sums begin with.
-                let start = if BYTES == 2 { (end - group) as i32 / 2 } else { 0 };
-                let mut whole = [[_mm256_set1_epi32(start); 2]; N];
+                let mut whole = [[_mm256_setzero_si256(); 2]; N];
                 while group < end {
                     let pair = _mm256_set1_epi32(*x.add(group));
                     for (half, sum) in whole.as_flattened_mut().iter_mut().enumerate() {

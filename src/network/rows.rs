@@ -1,4 +1,4 @@
-//! Matrix times vector in float32 with weights of any format, four rows at a time, for each instruction set.
+//! Matrix times vector in float32, four rows at a time, for each instruction set; in plain Rust also of weights that are whole numbers.
 //!
 //! The weights of four rows lie interleaved by lanes of sixteen, in the order in which they are read: one stream from the first byte
 //! to the last.
@@ -131,7 +131,7 @@ mod x86 {
                 Format::F32 => wide_f32(rows, input, output),
                 Format::F16 => wide_f16(rows, input, output),
                 Format::Bf16 => wide_bf16(rows, input, output),
-                // Whole numbers have kernels of their own.
+                // Not made: whole numbers have kernels of their own (`pairs`, `tiles`).
                 Format::I16 | Format::I8 => rows.portable(input, output),
             }
         }
@@ -147,6 +147,7 @@ mod x86 {
                 Format::F32 => narrow_f32(rows, input, output),
                 Format::F16 => narrow_f16(rows, input, output),
                 Format::Bf16 => narrow_bf16(rows, input, output),
+                // As above.
                 Format::I16 | Format::I8 => rows.portable(input, output),
             }
         }
