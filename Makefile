@@ -100,7 +100,8 @@ bench-peers: build venv $(BUILD)/peers/.done
 	RAVENPOSE_BENCH_ONLY=kernel target/release/ravenpose-bench full
 	$(BUILD)/peers/bin/python3 bench/keras_predict.py --out $(BUILD)/bench/peers.txt
 
-$(BUILD)/peers/.done: bench/requirements-peers.txt venv
+$(BUILD)/peers/.done: bench/requirements-peers.txt
+	mkdir -p $(BUILD)
 	$(PYTHON3) -m venv $(BUILD)/peers
 	$(BUILD)/peers/bin/python3 -m pip install --quiet --disable-pip-version-check -r bench/requirements-peers.txt
 	touch $@

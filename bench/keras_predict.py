@@ -5,6 +5,7 @@ All from Python, one thread, in turns within each round, on the last core. `make
 import argparse
 import os
 import pathlib
+import subprocess
 import time
 
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
@@ -54,6 +55,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=pathlib.Path)
     options = parser.parse_args()
+    if options.out:
+        # What an earlier run left is not this one's.
+        options.out.unlink(missing_ok=True)
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     tensorflow.config.threading.set_intra_op_parallelism_threads(1)
     tensorflow.config.threading.set_inter_op_parallelism_threads(1)
@@ -77,7 +81,7 @@ def main():
     rows = [(shift + scale * random.standard_normal((1, 118))).astype(numpy.float32) for _ in range(INPUTS)]
 
     wanted = [engines[name][1](rows[0]) for name in engines]
-    spread = max(float(numpy.abs(one - wanted[0]).max()) for one in wanted)
+    spread = float(numpy.max([numpy.abs(one - wanted[0]).max() for one in wanted]))
     if not spread < 1e-3:
         raise SystemExit(f"the engines differ by {spread} mm on one input: not the same network")
 
@@ -90,7 +94,8 @@ def main():
                 if k >= 5:
                     times[name].append((time.perf_counter_ns() - begun) / 1e3)
 
-    said = [f"{'From Python, one row, one thread, us':58} {'p50':>9} {'p99':>9} {'max':>9} {'/ ORT':>9}"]
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE, text=True).stdout.strip() or "unknown"
+    said = [f"{time.strftime('%Y-%m-%d %H:%M', time.gmtime())} UTC, commit {commit}", f"{'From Python, one row, one thread, us':58} {'p50':>9} {'p99':>9} {'max':>9} {'/ ORT':>9}"]
     peer = numpy.median(times[next(iter(engines))])
     for name, taken in times.items():
         said.append(f"  {name:56} {numpy.median(taken):9.1f} {numpy.quantile(taken, 0.99):9.1f} {max(taken):9.1f} {numpy.median(taken) / peer:9.2f}")

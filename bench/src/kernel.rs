@@ -13,6 +13,8 @@ use std::path::Path;
 const ROUNDS: usize = 5;
 const WARM_UP: usize = 500;
 const INPUTS: usize = 64;
+/// What a first answer may be off, mm: formats differ, networks more.
+const SAME_MM: f64 = 0.2;
 /// Runs between sleeps, and with flushed weights, per engine and round.
 const SLOW_ROUNDS: usize = 3;
 
@@ -161,6 +163,12 @@ pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> 
     let expected = Expected { inputs: 118, outputs: 3 };
     let network = ravenpose_importer::import(bytes, &expected).map_err(|error| error.to_string())?;
     let mut contenders = contenders(bytes, model, &network, &expected)?;
+    for contender in contenders.iter_mut().filter(|contender| !matches!(contender.engine, Engine::Floor(_))) {
+        let (found, truth) = (contender.engine.run(&contender.inputs[0]), network.evaluate_f64(&contender.inputs[0])[0]);
+        if (f64::from(found) - truth).abs() > SAME_MM.max(0.05 * truth.abs()) || found.is_nan() {
+            return Err(format!("{}: answers {found}, wanted {truth}: not the same network", contender.name.trim()));
+        }
+    }
     let mut sink = 0.0_f32;
     let mut tables = vec![deviations(&network)];
 
@@ -229,7 +237,7 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
     }
     // A large download: `make bench-peers` has it.
     if let Some(library) = wheel::library("openvino/libs", "libopenvino_c.so") {
-        let session = openvino::Session::open(&library, model, 118)?;
+        let session = openvino::Session::open(&library, model, [118, 3])?;
         let name = format!("OpenVINO {}, C, f32", session.version);
         all.push(Contender::new(name, Engine::OpenVino(Box::new(session)), 0, &usual));
     }

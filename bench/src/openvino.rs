@@ -21,7 +21,8 @@ struct Version {
 pub(crate) struct Session {
     infer: unsafe extern "C" fn(Handle) -> c_int,
     request: Handle,
-    input: &'static mut [f32],
+    input: *mut f32,
+    inputs: usize,
     output: *const f32,
     /// As the library states it, without its build.
     pub(crate) version: String,
@@ -31,8 +32,8 @@ pub(crate) struct Session {
 const PROPERTIES: [&CStr; 6] = [c"INFERENCE_NUM_THREADS", c"1", c"NUM_STREAMS", c"1", c"INFERENCE_PRECISION_HINT", c"f32"];
 
 impl Session {
-    /// Opens the model file; its input has so many values.
-    pub(crate) fn open(library: &Path, model: &Path, inputs: usize) -> Result<Self, String> {
+    /// Opens the model file, whose input and output have so many values.
+    pub(crate) fn open(library: &Path, model: &Path, widths: [usize; 2]) -> Result<Self, String> {
         let library = Library::open(library)?;
         let path = CString::new(model.display().to_string()).map_err(|cause| cause.to_string())?;
         // SAFETY: the signatures are those of the interface's headers; every pointer that is passed lives until the end of the call or of
@@ -48,7 +49,8 @@ impl Session {
             let input_of: Made = library.function(c"ov_infer_request_get_input_tensor")?;
             let output_of: Made = library.function(c"ov_infer_request_get_output_tensor")?;
             let data_of: Made = library.function(c"ov_tensor_data")?;
-            let infer = library.function(c"ov_infer_request_infer")?;
+            let size_of: unsafe extern "C" fn(Handle, *mut usize) -> c_int = library.function(c"ov_tensor_get_size")?;
+            let infer: unsafe extern "C" fn(Handle) -> c_int = library.function(c"ov_infer_request_infer")?;
 
             let mut version = Version { build: std::ptr::null(), description: std::ptr::null() };
             ok("version", version_of(&raw mut version))?;
@@ -63,22 +65,29 @@ impl Session {
             let [a, b, c, d, e, f] = PROPERTIES.map(CStr::as_ptr);
             ok("compiling", compile(core, network, c"CPU".as_ptr(), PROPERTIES.len(), &raw mut compiled, a, b, c, d, e, f))?;
             let request = made("request", request_of, compiled)?;
-            let input = made("input", data_of, made("input", input_of, request)?)?;
+            let memory = |what: &str, tensor: Handle, width: usize| {
+                let mut size = 0;
+                ok(what, size_of(tensor, &raw mut size))?;
+                let right = size == width;
+                if right { made(what, data_of, tensor) } else { Err(format!("OpenVINO, {what}: {size} values, {width} wanted")) }
+            };
+            let input = memory("input", made("input", input_of, request)?, widths[0])?.cast::<f32>();
+            input.write_bytes(0, widths[0]);
             // The output has its memory from the first run on.
-            let input = std::slice::from_raw_parts_mut(input.cast::<f32>(), inputs);
-            input.fill(0.0);
-            let run: unsafe extern "C" fn(Handle) -> c_int = infer;
-            ok("first run", run(request))?;
-            let output = made("output", data_of, made("output", output_of, request)?)?.cast::<f32>().cast_const();
+            ok("first run", infer(request))?;
+            let output = memory("output", made("output", output_of, request)?, widths[1])?.cast::<f32>().cast_const();
             let version = build.split('-').next().unwrap_or_default().to_owned();
-            Ok(Self { infer, request, input, output, version })
+            Ok(Self { infer, request, input, inputs: widths[0], output, version })
         }
     }
 
     pub(crate) fn run(&mut self, input: &[f32]) -> f32 {
-        self.input.copy_from_slice(input);
-        // SAFETY: the request was made by this interface and lives as long as this; so does its output, which has at least one value.
-        unsafe { if (self.infer)(self.request) == 0 { *self.output } else { f32::NAN } }
+        // SAFETY: the request was made by this interface and lives as long as this; its input has `inputs` values, which nobody else
+        // touches between two runs, its output at least one.
+        unsafe {
+            self.input.copy_from_nonoverlapping(input.as_ptr(), input.len().min(self.inputs));
+            if (self.infer)(self.request) == 0 { *self.output } else { f32::NAN }
+        }
     }
 }
 

@@ -72,7 +72,7 @@ impl World {
     }
 
     /// Has the service ended by itself?
-    fn ended(&mut self) -> bool {
+    pub(crate) fn ended(&mut self) -> bool {
         matches!(self.service.try_wait(), Ok(Some(_)))
     }
 

@@ -4,8 +4,9 @@
 use crate::path::{PERIOD_NS, WARM_UP, World, state};
 use crate::table::{Table, quantiles};
 use ravenpose::check;
+use ravenpose::cycle::Limits;
 use ravenpose_transport::{Reader, Writer, now_ns, sleep_until_ns};
-use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState, flag};
+use ravenpose_wire::{ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag};
 use std::io::{Seek as _, Write as _};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,19 +28,28 @@ const TWICE: u64 = 2003;
 /// Messages that may wait for the client that judges.
 const DEPTH: usize = 256;
 
+/// Silence after which the service is looked at.
+const SILENCE_NS: i64 = 1_000_000_000;
+/// States that may be skipped while corrections return after a fault.
+const SLACK: u64 = 100;
+
 /// What a part of the soak came to.
 #[derive(Default)]
 struct Seen {
-    /// State sent to pose taken, of the state that the pose answers, ns.
-    whole: Vec<i64>,
+    /// Made by the robot to sealed by the service, of the state that a pose answers, ns.
+    age: Vec<i64>,
     poses: u64,
+    /// Poses that this client lost since it was held up itself.
+    missed: u64,
     valid: u64,
     /// Faults sent and answered as such.
     refused: u64,
-    /// Fallback that a fault before it began: corrections return after a while.
+    /// Raw poses after a fault: corrections return after a while.
     held: u64,
-    /// Fallback for what the machine did: late, stale, settling.
+    /// Raw poses for what the machine did: late, stale, and settling after it.
     delayed: u64,
+    /// Up to this state, settling is explained by such a delay.
+    upset_until: u64,
 }
 
 /// Quiet for a minute, then under `load` for `minutes`.
@@ -63,66 +73,65 @@ pub(crate) fn run(minutes: u64, load: Load, service_core: usize, priority: i32) 
 
 fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -> Result<(), String> {
     let mut world = World::start("", core)?;
-    let open = |depth| Reader::<CorrectedPose>::open(&world.settings, depth).map_err(|error| error.to_string());
+    let settings = world.settings.clone();
+    let open = |depth| Reader::<CorrectedPose>::open(&settings, depth).map_err(|error| error.to_string());
     let _idle = (0..idle).map(|_| open(IDLE_DEPTH)).collect::<Result<Vec<_>, _>>()?;
-    let reader = open(DEPTH)?;
-    let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
-    let mut seen = Seen::default();
-    send(&writer, &reader, 1..=WARM_UP, &mut seen)?;
+    let link = (Writer::<RavenState>::open(&settings).map_err(|error| error.to_string())?, open(DEPTH)?);
+    // The service is new to the first states.
+    let mut warming = Seen { upset_until: WARM_UP, ..Seen::default() };
+    send(&mut world, &link, 1..=WARM_UP, &mut warming)?;
     let before = world.loop_faults();
-    seen = Seen { whole: Vec::with_capacity((seconds * 1000) as usize), ..Seen::default() };
-    let sent = send(&writer, &reader, WARM_UP + 1..=WARM_UP + seconds * 1000, &mut seen)?;
-    let faults = world.loop_faults().zip(before).map(|(after, before)| after - before);
-    let stats = world.stop().ok_or_else(|| format!("{name}: the service ended by itself: {}", world.last_words()))?;
+    let mut seen = Seen { age: Vec::with_capacity((seconds * 1000) as usize), upset_until: warming.upset_until, ..Seen::default() };
+    let (first, last) = (WARM_UP + 1, WARM_UP + seconds * 1000);
+    send(&mut world, &link, first..=last, &mut seen)?;
+    let after = world.loop_faults();
+    let ended = world.ended();
+    let stats =
+        world.stop().filter(|_| !ended).ok_or_else(|| format!("{name}: the service ended by itself: {}", world.last_words()))?;
     let counter = |name: &str| stats.counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value);
-    table.row(&format!("{name}: state sent -> pose taken, {} poses", seen.poses), &quantiles(&mut seen.whole));
+    let us = |quantiles: [u64; 4]| quantiles.map(|ns| ns as f64 / 1000.0);
+    table.row(&format!("{name}: state made -> pose sealed, {} poses", seen.poses), &quantiles(&mut seen.age));
     for stage in
         stats.stages.iter().filter(|stage| stage.count > 0 && ["inference", "total", "input_to_output"].contains(&&*stage.name))
     {
-        table.row(&format!("    {}", stage.name), &[stage.p50, stage.p99, stage.p999, stage.max].map(|ns| ns as f64 / 1000.0));
+        table.row(&format!("    {}", stage.name), &us([stage.p50, stage.p99, stage.p999, stage.max]));
     }
+    let (sent, skipped) = (last - WARM_UP, counter("skipped"));
+    let faulty = (first..=last).filter(|sequence| wanted(*sequence) != 0).count() as u64;
+    let Seen { poses, missed, valid, refused, held, delayed, .. } = seen;
     println!(
-        "{name}: {sent} states sent, {} poses, {} valid, {} faults answered as such, {} held after one, {} fallbacks for lateness, {} skipped, {} twice; page faults of the \
-         loop's thread: {}",
-        seen.poses,
-        seen.valid,
-        seen.refused,
-        seen.held,
-        seen.delayed,
-        counter("skipped"),
+        "{name}: {sent} states sent, {poses} poses and {missed} that this client missed; {valid} valid, {refused} of {faulty} faults answered as such, \
+         {held} raw after one, {delayed} raw for lateness; {skipped} skipped, {} came twice",
         counter("duplicates"),
-        faults.map_or_else(|| "not known".to_owned(), |faults| faults.to_string()),
     );
-    for (what, count) in
-        [("lost", counter("lost")), ("out_of_order", counter("out_of_order")), ("send_failures", counter("send_failures"))]
-    {
-        if count > 0 {
-            return Err(format!("{name}: {what}: {count}"));
-        }
-    }
-    if faults.is_some_and(|faults| faults > 0) {
-        return Err(format!("{name}: the loop's thread had page faults"));
-    }
-    Ok(())
+    let wrong = [
+        (counter("lost") > 0, "states were lost"),
+        (counter("out_of_order") > 0, "states came out of order"),
+        (counter("send_failures") > 0, "poses could not be sent"),
+        (poses + missed + skipped + SLACK < sent, "states were not answered"),
+        (refused + missed + skipped + delayed < faulty, "faults were not answered as such"),
+        (valid * 2 < poses, "less than half of the poses were valid"),
+        (before.is_some() && before != after, "the loop's thread had page faults"),
+    ];
+    wrong.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, what)| Err(format!("{name}: {what}")))
 }
 
-/// Sends these states, one a millisecond, and judges every pose that comes meanwhile; returns how many were sent.
+/// Sends these states, one a millisecond, and judges every pose that comes meanwhile.
 fn send(
-    writer: &Writer<RavenState>,
-    reader: &Reader<CorrectedPose>,
+    world: &mut World,
+    (writer, reader): &(Writer<RavenState>, Reader<CorrectedPose>),
     sequences: std::ops::RangeInclusive<u64>,
     seen: &mut Seen,
-) -> Result<u64, String> {
-    let count = sequences.clone().count() as u64;
+) -> Result<(), String> {
     let mut next = now_ns();
-    let mut read_ns = next;
+    let (mut read_ns, mut heard_ns) = (next, next);
     let mut last: Option<u64> = None;
     for sequence in sequences {
         let mut state = state(sequence);
-        if sequence.is_multiple_of(NOT_FINITE) {
-            state.jpos[1] = f32::NAN;
-        } else if sequence.is_multiple_of(IMPOSSIBLE) {
-            state.jpos[1] = 1e9;
+        match wanted(sequence) {
+            0 => {}
+            flag::INPUT_NOT_FINITE => state.jpos[1] = f32::NAN,
+            _ => state.jpos[1] = 1e9,
         }
         state.seal(sequence);
         for _ in 0..=u64::from(sequence.is_multiple_of(TWICE)) {
@@ -134,40 +143,56 @@ fn send(
         let held_up = now_ns() - read_ns > DEPTH as i64 * PERIOD_NS;
         read_ns = now_ns();
         while let Some(pose) = reader.next().map_err(|error| error.to_string())? {
-            if last.is_some_and(|last| pose.sequence != last + 1) && !held_up {
-                return Err(format!("pose {} came after {last:?}", pose.sequence));
+            let expected = last.map_or(pose.sequence, |last| last + 1);
+            if pose.sequence != expected && !held_up {
+                return Err(format!("pose {} came, {expected} was expected", pose.sequence));
             }
-            last = Some(pose.sequence);
+            seen.missed += pose.sequence.saturating_sub(expected);
+            (last, heard_ns) = (Some(pose.sequence), read_ns);
             judge(&pose, seen)?;
         }
+        if read_ns - heard_ns > SILENCE_NS && world.ended() {
+            return Err(format!("the service ended by itself: {}", world.last_words()));
+        }
     }
-    Ok(count)
+    Ok(())
+}
+
+/// The flag that a state calls for; 0 for a good one.
+fn wanted(sequence: u64) -> u32 {
+    if sequence.is_multiple_of(NOT_FINITE) {
+        flag::INPUT_NOT_FINITE
+    } else if sequence.is_multiple_of(IMPOSSIBLE) {
+        flag::INPUT_IMPOSSIBLE
+    } else {
+        0
+    }
 }
 
 /// Are status and flags those that the state which this pose answers calls for?
 fn judge(pose: &CorrectedPose, seen: &mut Seen) -> Result<(), String> {
-    const FAULTS: u32 = flag::INPUT_NOT_FINITE | flag::INPUT_IMPOSSIBLE;
     /// What a machine that stops for a moment may do to any pose.
-    const DELAYED: u32 = flag::INPUT_STALE | flag::BUDGET_EXCEEDED | flag::SETTLING | flag::NEW_SOURCE;
-    let arm = &pose.arm[0];
-    let wanted = match pose.source_sequence {
-        sequence if sequence.is_multiple_of(NOT_FINITE) => flag::INPUT_NOT_FINITE,
-        sequence if sequence.is_multiple_of(IMPOSSIBLE) => flag::INPUT_IMPOSSIBLE,
-        _ => 0,
-    };
-    let reasons = arm.flags & ravenpose_wire::FALLBACK_REASONS & !flag::UNTRAINED;
-    let valid = arm.status == ArmStatus::Valid as u32;
+    const DELAYED: u32 = flag::INPUT_STALE | flag::BUDGET_EXCEEDED | flag::NEW_SOURCE;
+    /// What is said of an impossible state as well.
+    const ALONG: u32 = flag::SETTLING | flag::OUT_OF_RANGE | flag::OUT_OF_DOMAIN;
+    let (arm, sequence) = (&pose.arm[0], pose.source_sequence);
+    let settling = u64::from(Limits::default().good_cycles) + SLACK;
+    let reasons = arm.flags & FALLBACK_REASONS;
     seen.poses += 1;
-    seen.whole.push(pose.publish_time_ns - pose.source_time_ns);
-    let (faulty, delayed) = (reasons & FAULTS != 0, reasons & DELAYED != 0);
-    match (wanted, valid) {
-        (0, true) if reasons == 0 => seen.valid += 1,
-        (0, false) if faulty && reasons & !(DELAYED | FAULTS) == 0 => seen.held += 1,
-        (0, false) if delayed && reasons & !DELAYED == 0 => seen.delayed += 1,
-        (wanted, false) if reasons & wanted != 0 => seen.refused += 1,
-        _ => {
-            return Err(format!("a wrong answer to state {}: status {}, flags {:#x}", pose.source_sequence, arm.status, arm.flags));
-        }
+    seen.age.push(pose.publish_time_ns - pose.source_time_ns);
+    if reasons & DELAYED != 0 {
+        seen.upset_until = sequence + settling;
+    }
+    let after_fault = (sequence % NOT_FINITE).min(sequence % IMPOSSIBLE) <= settling;
+    let valid = arm.status == ArmStatus::Valid as u32;
+    match (wanted(sequence), reasons & !DELAYED) {
+        (0, 0) if valid && reasons == 0 => seen.valid += 1,
+        // One that is stale is not judged again.
+        (_, 0) if !valid && reasons != 0 => seen.delayed += 1,
+        (0, flag::SETTLING) if !valid && after_fault => seen.held += 1,
+        (0, flag::SETTLING) if !valid && sequence <= seen.upset_until => seen.delayed += 1,
+        (wanted, found) if wanted & found != 0 && !valid && found & !(wanted | ALONG) == 0 => seen.refused += 1,
+        _ => return Err(format!("a wrong answer to state {sequence}: status {}, flags {:#x}", arm.status, arm.flags)),
     }
     Ok(())
 }
@@ -228,13 +253,13 @@ fn stream(stop: &AtomicBool) -> Result<(), String> {
 
 fn write(stop: &AtomicBool) -> Result<(), String> {
     let path = std::env::temp_dir().join(format!("ravenpose-soak-{}", std::process::id()));
-    let written = fill(&path, stop).map_err(|cause| format!("{}: {cause}", path.display()));
-    let _ = std::fs::remove_file(&path);
-    written
+    fill(&path, stop).map_err(|cause| format!("{}: {cause}", path.display()))
 }
 
 fn fill(path: &Path, stop: &AtomicBool) -> std::io::Result<()> {
     let mut file = std::fs::File::create(path)?;
+    // It goes with its handle, however this program ends.
+    std::fs::remove_file(path)?;
     let block = vec![7; 1 << 20];
     while !stop.load(Relaxed) {
         file.write_all(&block)?;
