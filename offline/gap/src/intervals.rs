@@ -1,6 +1,6 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{Candidate, Column, Dictionary, Window, rounds};
+use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Window, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
@@ -38,7 +38,7 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("stribeck_friction", _) => 0.35,
         ("cable_hysteresis", "z_m") | ("load_dependent_friction", _) => 0.3,
         ("torque_ripple", _) => 0.2,
-        ("payload", "m_p") if form == SUPPOSED => 0.2,
+        ("payload", "m_p") if form == AT_THE_TIP => 0.2,
         ("cable_creep", _) => 0.18,
         ("gravity_direction" | "cable_hysteresis", _) => 0.15,
         ("cable_stretch", _) => 0.1,
@@ -48,13 +48,12 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
     }
 }
 
-/// A form of payload whose place was not asked of the data: nearer than this to the tip, m, it may be anywhere.
-const SUPPOSED: &str = "at the tip";
+/// A payload that is supposed at the tip may be anywhere nearer than this to it, m.
 const SUPPOSED_M: f64 = 0.05;
 
 /// Half the interval of what was supposed, not found.
 fn supposed(physics: &str, form: &str, name: &str) -> f64 {
-    if physics == "payload" && form == SUPPOSED && name.starts_with("c_") { SUPPOSED_M } else { 0.0 }
+    if physics == "payload" && form == AT_THE_TIP && name.starts_with("c_") { SUPPOSED_M } else { 0.0 }
 }
 
 /// How far a parameter is from no effect; of a direction, the whole of it.

@@ -8,6 +8,9 @@ use super::{Bound, Family};
 use crate::nominal::Evaluator;
 use crate::problem::Channel;
 
+/// The form of a payload whose place is supposed, not asked of the data.
+pub(crate) const AT_THE_TIP: &str = "at the tip";
+
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if !dictionary.problem.has(TORQUE) {
         return;
@@ -16,7 +19,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let n = robot.joint_count();
     let last = n - 1;
     let tip = robot.arm.tool_pose().translation.vector;
-    let mut places = vec![("at the tip", last, tip)];
+    let mut places = vec![(AT_THE_TIP, last, tip)];
     places.extend(robot.payload_sites.iter().map(|site| ("at a site", site.link, Vector3::from(site.position_m))));
     for (form, link, point) in places {
         all.push(Family::shaped(

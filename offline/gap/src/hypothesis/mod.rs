@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 pub use dictionary::{Column, Dictionary, Window};
 pub use environment::direction;
+pub(crate) use inertial::AT_THE_TIP;
 
 use crate::problem::Channel;
 
