@@ -124,7 +124,7 @@ prove: offline
 	target/release/ravenpose prove --matrix full --seed $(PROOF_SEED) --out $(BUILD)/proof/full-$(PROOF_SEED)
 
 # The shipped model again, from nothing: simulate 140 minutes after one homing (4 GB in build/training), train, judge on the runs that
-# training left sealed. MODEL_PRESET=memory for the one that the service cannot run yet.
+# training left sealed. MODEL_PRESET=one-state for the same without a memory.
 MODEL_PRESET ?= default
 model: offline
 	if [ ! -f $(BUILD)/training/runs/simulation.txt ]; then rm -rf $(BUILD)/training/runs; \

@@ -42,8 +42,8 @@ pub enum CardError {
 /// One golden pair: an input and the output that the network gave when it was exported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Golden {
-    /// 118 features.
-    pub input: Vec<f32>,
+    /// 118 features; a memory has seen nothing else.
+    pub input: [f32; FEATURES],
     /// Position error, mm.
     pub output: [f64; 3],
 }
@@ -61,6 +61,8 @@ pub struct Card {
     pub bound_mm: f64,
     /// 95 % half width per axis, mm; NaN if none is stated.
     pub bound95_mm: [f64; 3],
+    /// The same while the model's memory is not settled, mm; NaN if none is stated.
+    pub bound95_unsettled_mm: [f64; 3],
     /// Golden pairs.
     pub golden: Vec<Golden>,
 }
@@ -96,22 +98,21 @@ impl Card {
                 f64::from(bound)
             }
         };
-        let bound95_mm = match get("ravenpose.bound95_mm") {
-            None => [f64::NAN; 3],
-            Some(text) => {
-                let key = "ravenpose.bound95_mm";
-                let bounds = numbers::<3>(key, text)?.map(f64::from);
-                if let Some(bound) = bounds.iter().find(|bound| **bound < 0.0) {
-                    return Err(CardError::Numbers { key, problem: format!("{bound} is not a half width") });
-                }
-                bounds
+        let half_widths = |key: &'static str| -> Result<[f64; 3], CardError> {
+            let Some(text) = get(key) else { return Ok([f64::NAN; 3]) };
+            let bounds = numbers::<3>(key, text)?.map(f64::from);
+            match bounds.iter().find(|bound| **bound < 0.0) {
+                Some(bound) => Err(CardError::Numbers { key, problem: format!("{bound} is not a half width") }),
+                None => Ok(bounds),
             }
         };
+        let bound95_mm = half_widths("ravenpose.bound95_mm")?;
+        let bound95_unsettled_mm = half_widths("ravenpose.bound95_unsettled_mm")?;
         let golden = golden(get("ravenpose.golden").unwrap_or(""))?;
         if golden.is_empty() && !untrained {
             return Err(CardError::Missing { key: "ravenpose.golden" });
         }
-        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, golden })
+        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, bound95_unsettled_mm, golden })
     }
 
     /// Golden pairs are taken from training, so one outside of the trained range shows that the range is of another feature order
@@ -170,7 +171,7 @@ fn golden(text: &str) -> Result<Vec<Golden>, CardError> {
         .map(|line| {
             let row: [f64; FEATURES + 3] = parse("ravenpose.golden", line)?;
             let output = [row[FEATURES], row[FEATURES + 1], row[FEATURES + 2]];
-            Ok(Golden { input: row[..FEATURES].iter().map(|&value| value as f32).collect(), output })
+            Ok(Golden { input: std::array::from_fn(|feature| row[feature] as f32), output })
         })
         .collect()
 }

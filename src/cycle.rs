@@ -5,7 +5,7 @@
 //! why; the correction comes back after 100 good cycles in a row, slewed.
 
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
-use crate::guard::Guard;
+use crate::guard::{Guard, Verdict};
 use nalgebra::Vector3;
 use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
 
@@ -17,10 +17,29 @@ const FUTURE_NS: i64 = 1_000_000;
 const WARM_ROUNDS: usize = 16;
 /// A larger gap in the sequence is a restart of the source, not a loss.
 const GAP_MAX: u64 = 10_000;
+/// After so many periods without a state that could be followed an estimator forgets. A joint that turns twice within 20 ms, at the
+/// 10 rad/s^2 that its motor gives it, comes 0.25 mrad far: a sixth of the narrowest play.
+const UNSEEN_PERIODS: i64 = 20;
 
-/// What evaluates the network: 118 features to a position error in mm.
+/// What evaluates the network: 118 features to a position error in mm. Nothing here may allocate, block or panic.
 pub trait Estimator {
-    /// Evaluates; must not allocate, block or panic.
+    /// Does its answer depend on the states before?
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// Takes in a state, which is the newest from now on.
+    fn follow(&mut self, _features: &[f32; FEATURES]) {}
+
+    /// Forgets all states: the arm may have moved unseen.
+    fn forget(&mut self) {}
+
+    /// Has it seen enough of the motion?
+    fn is_settled(&self) -> bool {
+        true
+    }
+
+    /// Evaluates the features that it followed last.
     fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]);
 
     /// Does a microsecond's worth of what makes the next run fast; changes no result.
@@ -78,6 +97,8 @@ pub struct Model<E> {
     pub bound_um: f64,
     /// Stated 95 % half width per axis, µm; NaN if it states none.
     pub bound95_um: [f64; 3],
+    /// The same while the estimator is not settled.
+    pub bound95_unsettled_um: [f64; 3],
     /// Marked untrained?
     pub untrained: bool,
 }
@@ -132,6 +153,8 @@ impl Stopwatch for () {}
 
 struct Arm<E> {
     model: ArmModel<E>,
+    /// Source time of the state that the estimator followed last.
+    followed_ns: i64,
     frozen: FrozenWatch,
     correction_um: Vector3<f64>,
     hold: u32,
@@ -168,6 +191,7 @@ impl<E: Estimator> Cycle<E> {
     pub fn new(limits: Limits, models: [ArmModel<E>; ARMS], allow_untrained: bool, standing_flags: u32) -> Self {
         let arms = models.map(|model| Arm {
             model,
+            followed_ns: i64::MIN,
             frozen: FrozenWatch::default(),
             correction_um: Vector3::zeros(),
             hold: limits.good_cycles,
@@ -262,6 +286,7 @@ impl<E: Estimator> Cycle<E> {
         }
         if self.pending {
             count(&mut self.counters.skipped);
+            self.remember_overtaken();
         }
         count(&mut self.counters.accepted);
         self.newest = state;
@@ -289,6 +314,18 @@ impl<E: Estimator> Cycle<E> {
     fn begin_source(&mut self) {
         count(&mut self.counters.sources);
         self.new_source = true;
+    }
+
+    /// A state that a newer one overtakes is not answered, but where the joints were is remembered.
+    fn remember_overtaken(&mut self) {
+        for (index, arm) in self.arms.iter_mut().enumerate() {
+            let ArmModel::Loaded(model) = &mut arm.model else { continue };
+            if model.estimator.remembers() && self.newest.connected() & (1 << index) != 0 {
+                features::extract(&self.newest, index, &mut self.features);
+                let verdict = model.guard.check(&self.features);
+                model.follow(verdict, &self.newest, &self.features, &self.limits, &mut arm.followed_ns);
+            }
+        }
     }
 
     /// Answers the newest state, or the lack of one. Returns whether `pose` is to be published after [`Cycle::finish`].
@@ -328,6 +365,7 @@ impl<E: Estimator> Cycle<E> {
             let arm = &mut self.arms[index];
             if common & flag::NEW_SOURCE != 0 {
                 arm.frozen.reset();
+                arm.forget();
             }
             // A repeated message says only that the input is stale: its numbers were judged when they were new.
             let judged = if answered {
@@ -428,7 +466,28 @@ struct Judgement {
     target_um: Vector3<f64>,
 }
 
+impl<E: Estimator> Model<E> {
+    /// Lets the estimator follow a state, whether it is corrected or not, unless its numbers cannot be the robot's.
+    fn follow(&mut self, verdict: Verdict, state: &RavenState, features: &[f32; FEATURES], limits: &Limits, followed_ns: &mut i64) {
+        if verdict.reasons & (flag::INPUT_NOT_FINITE | flag::INPUT_IMPOSSIBLE) != 0 {
+            return;
+        }
+        if state.source_time_ns.saturating_sub(*followed_ns) > limits.period_ns.saturating_mul(UNSEEN_PERIODS) {
+            self.estimator.forget();
+        }
+        *followed_ns = state.source_time_ns;
+        self.estimator.follow(features);
+    }
+}
+
 impl<E: Estimator> Arm<E> {
+    /// What the estimator remembers is of another source, or of before a disconnection.
+    fn forget(&mut self) {
+        if let ArmModel::Loaded(model) = &mut self.model {
+            model.estimator.forget();
+        }
+    }
+
     /// Reasons and information that hold whatever the state is: those of the model.
     fn standing(&self, allow_untrained: bool) -> (u32, u32) {
         match &self.model {
@@ -461,6 +520,7 @@ impl<E: Estimator> Arm<E> {
         let verdict = model.guard.check(features);
         judged.reasons |= verdict.reasons;
         judged.score = verdict.score;
+        model.follow(verdict, state, features, limits, &mut self.followed_ns);
         if judged.reasons != 0 {
             return judged;
         }
@@ -527,7 +587,11 @@ impl<E: Estimator> Arm<E> {
         }
         let still_missing = target_um - self.correction_um;
         let stated = match &self.model {
-            ArmModel::Loaded(model) => model.bound95_um,
+            ArmModel::Loaded(model) if model.estimator.is_settled() => model.bound95_um,
+            ArmModel::Loaded(model) => {
+                out.flags |= flag::MEMORY_UNSETTLED;
+                model.bound95_unsettled_um
+            }
             _ => [f64::NAN; 3],
         };
         out.status = ArmStatus::Valid as u32;
@@ -579,6 +643,7 @@ impl<E: Estimator> Arm<E> {
         self.correction_um = Vector3::zeros();
         self.hold = limits.good_cycles;
         self.frozen.reset();
+        self.forget();
         ArmPose { flags, reset_count: self.reset_count, ..ArmPose::ABSENT }
     }
 }

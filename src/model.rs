@@ -1,9 +1,11 @@
 //! From a file to a model that the loop may run: size, hash, import, card, plan, golden pairs. Each step refuses with one line.
+//! What runs is an [`Estimate`]: the plan, and the memory in front of it if the model has one.
 
-use crate::card::{Card, CardError};
+use crate::card::{Card, CardError, Golden};
 use crate::config::{self, ModelSource, shown_path};
 use crate::cycle::{Estimator, Model};
 use crate::guard::Guard;
+use crate::memory::Memory;
 use crate::network::{self, Deviation, NotExactEnough, Plan};
 use ravenpose_importer::{Expected, ImportError, Network};
 use ravenpose_wire::FEATURES;
@@ -100,7 +102,7 @@ pub enum ModelError {
 /// A model that the loop may run.
 pub struct Loaded {
     /// The plan, and what guards it.
-    pub model: Model<Plan>,
+    pub model: Model<Estimate>,
     /// What the file's metadata says.
     pub card: Card,
     /// How far the plan's weights are off, mm.
@@ -111,17 +113,64 @@ impl Loaded {
     /// `weights i16, at most 0.6 um from float64 over 264 inputs`.
     pub fn weights(&self) -> String {
         let Deviation { worst, inputs, .. } = self.deviation;
-        format!("weights {}, at most {:.2} um from float64 over {inputs} inputs", self.model.estimator.format(), worst * 1000.0)
+        format!(
+            "weights {}, at most {:.2} um from float64 over {inputs} inputs",
+            self.model.estimator.plan.format(),
+            worst * 1000.0
+        )
     }
 }
 
-impl Estimator for Plan {
+/// A network as the loop runs it: its memory of the recent motion, and the plan.
+pub struct Estimate {
+    plan: Plan,
+    memory: Memory,
+    /// The features, and behind them where they stand within each play.
+    input: Box<[f32]>,
+}
+
+impl Estimate {
+    /// A network's plan with a memory that has seen nothing.
+    pub fn new(network: &Network, plan: Plan) -> Self {
+        let memory = Memory::new(&network.plays);
+        Self { plan, input: vec![0.0; FEATURES + memory.len()].into(), memory }
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+}
+
+impl Estimator for Estimate {
+    fn remembers(&self) -> bool {
+        !self.memory.is_empty()
+    }
+
+    fn follow(&mut self, features: &[f32; FEATURES]) {
+        self.memory.follow(features);
+    }
+
+    fn forget(&mut self) {
+        self.memory.forget();
+    }
+
+    fn is_settled(&self) -> bool {
+        self.memory.is_settled()
+    }
+
     fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
-        Plan::run(self, features, error_mm);
+        if self.memory.is_empty() {
+            return self.plan.run(features, error_mm);
+        }
+        let (own, places) = self.input.split_at_mut(FEATURES);
+        own.copy_from_slice(features);
+        self.memory.places(features, places);
+        self.plan.run(&self.input, error_mm);
     }
 
     fn keep_warm(&mut self) {
-        Plan::keep_warm(self);
+        self.plan.keep_warm();
     }
 }
 
@@ -158,17 +207,20 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     drop(bytes);
     let unusable = |cause| ModelError::Card { path: path.clone(), cause };
     let card = Card::read(&network.metadata).map_err(unusable)?;
-    check_golden(&path, &mut Plan::new(&network), &card)?;
+    check_golden(&path, &mut Estimate::new(&network, Plan::new(&network)), &card)?;
     card.check_range().map_err(unusable)?;
-    let golden: Vec<&[f32]> = card.golden.iter().map(|golden| &*golden.input).collect();
+    // Places of a memory that has seen nothing else are zero.
+    let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len()]].concat();
+    let golden: Vec<Vec<f32>> = card.golden.iter().map(seen).collect();
     let choice = network::choose(&network, &golden, source.weights_deviation_um / 1000.0, source.weights)
         .map_err(|cause| ModelError::Weights { path: path.clone(), cause })?;
     let model = Model {
-        estimator: choice.plan,
+        estimator: Estimate::new(&network, choice.plan),
         guard: Guard::new(card.domain.clone()),
         id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
         bound_um: card.bound_mm * 1000.0,
         bound95_um: card.bound95_mm.map(|mm| mm * 1000.0),
+        bound95_unsettled_um: card.bound95_unsettled_mm.map(|mm| mm * 1000.0),
         untrained: card.untrained,
     };
     Ok(Loaded { model, card, deviation: choice.deviation })
@@ -214,10 +266,10 @@ fn stated_hash(model: &Path) -> Result<(String, String), ModelError> {
 }
 
 #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
-fn check_golden(path: &str, plan: &mut Plan, card: &Card) -> Result<(), ModelError> {
+fn check_golden(path: &str, estimate: &mut Estimate, card: &Card) -> Result<(), ModelError> {
     for (index, golden) in card.golden.iter().enumerate() {
         let mut output = [0.0_f32; 3];
-        plan.run(&golden.input, &mut output);
+        estimate.run(&golden.input, &mut output);
         for (axis, (found, expected)) in output.into_iter().map(f64::from).zip(golden.output).enumerate() {
             // Written so that NaN fails.
             if !((found - expected).abs() <= GOLDEN_TOLERANCE * expected.abs().max(1.0)) {

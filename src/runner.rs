@@ -415,12 +415,12 @@ fn offer_each<E: Estimator>(
 mod tests {
     use super::*;
     use crate::cycle::ArmModel;
-    use crate::network::Plan;
+    use crate::model::Estimate;
     use std::cell::Cell;
 
     #[test]
     fn states_that_come_while_the_queue_is_read_are_not_from_the_future() {
-        let mut cycle = Cycle::<Plan>::new(Limits::default(), [ArmModel::None, ArmModel::None], true, 0);
+        let mut cycle = Cycle::<Estimate>::new(Limits::default(), [ArmModel::None, ArmModel::None], true, 0);
         let clock = Cell::new(1_000_000_000);
         let (taken_ns, sound) = offer_each(
             &mut cycle,

@@ -3,12 +3,12 @@
 use crate::config::{Config, Wait};
 use crate::cycle::{ArmModel, Cycle};
 use crate::histogram::{self, Histograms};
-use crate::network::Plan;
+use crate::model::{self, Estimate};
 use crate::realtime::{self, Missing};
 use crate::runner::{Ended, Runner, TestHook, Waiting};
 use crate::shared::{self, EventSender, Shared};
 use crate::watch::{NAMES, TICK, Watch, notify};
-use crate::{model, say, signals};
+use crate::{say, signals};
 use ravenpose_transport::Message;
 use ravenpose_wire::{ARMS, CorrectedPose, flag};
 use sd_notify::NotifyState;
@@ -95,7 +95,7 @@ fn test_hook(text: &str) -> Result<TestHook, String> {
 
 /// Everything that is prepared before any thread starts.
 struct Prepared {
-    models: [ArmModel<Plan>; ARMS],
+    models: [ArmModel<Estimate>; ARMS],
     names: [String; ARMS],
 }
 
@@ -244,7 +244,7 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
 
 fn spawn_loop(
     config: &Config,
-    cycle: Cycle<Plan>,
+    cycle: Cycle<Estimate>,
     hook: Option<TestHook>,
     ends: (histogram::Recorder, EventSender, Arc<Shared>),
     ready: SyncSender<Result<(), ()>>,

@@ -9,8 +9,8 @@ use onnx::{Onnx, Small, words};
 use ravenpose::card::{Card, UNITS};
 use ravenpose::config::ModelSource;
 use ravenpose::cycle::Model;
-use ravenpose::model;
-use ravenpose::network::{Format, Plan};
+use ravenpose::model::{self, Estimate};
+use ravenpose::network::Format;
 use ravenpose_wire::{FEATURES, features};
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -32,7 +32,7 @@ fn hash(bytes: &[u8]) -> String {
 }
 
 /// Loads a file; a refusal must be one printable line that begins with the file.
-fn load(path: &Path, sha256: Option<String>) -> Result<(Model<Plan>, Card), String> {
+fn load(path: &Path, sha256: Option<String>) -> Result<(Model<Estimate>, Card), String> {
     let source = ModelSource { sha256, ..ModelSource::new(path.to_owned()) };
     model::load(&source).map(|loaded| (loaded.model, loaded.card)).map_err(|error| {
         let line = error.to_string();
@@ -43,7 +43,7 @@ fn load(path: &Path, sha256: Option<String>) -> Result<(Model<Plan>, Card), Stri
 }
 
 /// Loads these bytes with their right hash.
-fn load_bytes(directory: &TempDir, bytes: &[u8]) -> Result<(Model<Plan>, Card), String> {
+fn load_bytes(directory: &TempDir, bytes: &[u8]) -> Result<(Model<Estimate>, Card), String> {
     load(&directory.file("model.onnx", bytes), Some(hash(bytes)))
 }
 
@@ -596,7 +596,8 @@ fn a_flipped_bit_under_a_right_hash_gives_a_model_or_one_line() {
 fn the_smallest_weights_that_are_exact_enough_are_chosen_and_a_format_that_is_not_is_refused() {
     let with = |weights, weights_deviation_um| {
         let source = ModelSource { weights, weights_deviation_um, ..ModelSource::new(common::untrained()) };
-        model::load(&source).map(|loaded| (loaded.model.estimator.format(), loaded.deviation.worst * 1000.0, loaded.weights()))
+        model::load(&source)
+            .map(|loaded| (loaded.model.estimator.plan().format(), loaded.deviation.worst * 1000.0, loaded.weights()))
     };
     let mut worst = Vec::new();
     for (limit_um, format) in [(1e-3, Format::F32), (10.0, Format::I16), (1000.0, Format::I8)] {

@@ -8,12 +8,15 @@ mod proof;
 use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, nothing_happens, role, thread_id};
 use ravenpose::config::{ModelSource, Wait};
 use ravenpose::cycle::{ArmModel, Cycle, Limits};
+use ravenpose::memory::Play;
+use ravenpose::model::Estimate;
 use ravenpose::network::Plan;
 use ravenpose::runner::{Runner, Waiting};
 use ravenpose::shared::Shared;
 use ravenpose::{histogram, model, realtime, shared};
+use ravenpose_importer::{Activation, Network};
 use ravenpose_transport::{Reader, Settings, Writer, now_ns, sleep_until_ns};
-use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
+use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering::SeqCst};
 use std::time::Duration;
@@ -27,14 +30,24 @@ static MACHINE: std::sync::Mutex<()> = std::sync::Mutex::new(());
 const TURNS: u64 = 1_000_000;
 const WARM_UP: u64 = 5_000;
 
-fn untrained() -> ArmModel<Plan> {
+fn untrained() -> ArmModel<Estimate> {
     let loaded = model::load(&ModelSource::new(common::untrained())).expect("the repository's model");
     ArmModel::Loaded(Box::new(loaded.model))
 }
 
-fn runner(settings: &Settings, wait: Wait) -> (Runner<Plan>, histogram::Collector, shared::EventReceiver, Arc<Shared>) {
+/// The same with another network, which has plays on all joints in front.
+fn remembering() -> ArmModel<Estimate> {
+    let mut loaded = model::load(&ModelSource::new(common::untrained())).expect("the repository's model");
+    let plays: Vec<Play> = (56..64).map(|input| Play { input, half_width: 0.05 }).collect();
+    let weight = |place: usize, _: usize| 0.001 * (place % 17) as f32 - 0.008;
+    let network = Network { plays, ..Network::dense(&[FEATURES + 8, 64, 3], Activation::Tanh, weight) };
+    loaded.model.estimator = Estimate::new(&network, Plan::new(&network));
+    ArmModel::Loaded(Box::new(loaded.model))
+}
+
+fn runner(settings: &Settings, wait: Wait) -> (Runner<Estimate>, histogram::Collector, shared::EventReceiver, Arc<Shared>) {
     let limits = Limits::default();
-    let cycle = Cycle::new(limits, [untrained(), untrained()], true, 0);
+    let cycle = Cycle::new(limits, [untrained(), remembering()], true, 0);
     let (recorder, collector) = histogram::exchange();
     let (sender, events) = shared::events();
     let shown = Arc::new(Shared::default());
@@ -60,7 +73,9 @@ fn state(sequence: u64) -> RavenState {
     state.dt_nsec = 1_000_000;
     for arm in 0..2 {
         state.pos[arm * 3] = (sequence % 1000) as i32;
-        state.jpos[arm * 8..arm * 8 + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
+        // There and back, further than any play.
+        let moved = (sequence % 1000).min(1000 - sequence % 1000) as f32 * 1e-3;
+        state.jpos[arm * 8..arm * 8 + 3].copy_from_slice(&[30.0 + moved, 90.0 - moved, 22.9]);
         state.jpos_d[arm * 8..arm * 8 + 3].copy_from_slice(&[30.0, 90.0, 22.9]);
         state.enc_vals[arm * 8] = (sequence % 1000) as i32;
     }
@@ -70,10 +85,9 @@ fn state(sequence: u64) -> RavenState {
     state
 }
 
-/// One arm, so that a million turns take about a minute. Every tenth thousand turn has a fault, so that fallback paths are proven too.
+/// Every tenth thousand turn has a fault, so that fallback paths are proven too.
 fn faulty(sequence: u64) -> RavenState {
     let mut state = state(sequence);
-    state.arms = 1;
     match sequence % 10_000 {
         0 => state.tau[0] = f32::NAN,
         2_500 => state.pos[0] = 9_000_000,
@@ -118,7 +132,7 @@ fn million() -> ! {
                     runner.turn();
                 }
                 while let Some(pose) = reader.next().expect("pose read") {
-                    if pose.arm[0].status == ArmStatus::Valid as u32 {
+                    if pose.arm.iter().all(|arm| arm.status == ArmStatus::Valid as u32) {
                         VALID.fetch_add(1, SeqCst);
                     }
                 }

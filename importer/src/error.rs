@@ -90,6 +90,12 @@ pub enum ImportError {
         /// What to change.
         remedy: &'static str,
     },
+    /// A memory in front of the layers that is not of the one form that is understood.
+    #[error("the memory in front of the layers: {found}: expected the eight nodes that `ravenpose train` writes (docs/models.md)")]
+    Memory {
+        /// What is different.
+        found: String,
+    },
     /// A tensor of a type other than float32 (or of integers for a shape).
     #[error("tensor `{tensor}` is {found}: expected float32; export the model with float32 weights")]
     TensorType {

@@ -4,7 +4,7 @@
 //! weights or a negative variance, hides the NaN behind a clamped sigmoid, and panics on some graphs. So an import runs in four
 //! steps, and each may only refuse:
 //!
-//! 1. the protobuf is bounded, decoded and checked (`wire`, `check`);
+//! 1. the protobuf is bounded, decoded and checked (`wire`, `check`); a memory in front of the layers is read and cut off (`memory`);
 //! 2. tract works out the graph, with panics caught (`tract`, `guard`), and its graph is read as one chain (`chain`);
 //! 3. elementwise steps are folded into the layers in double precision (`fold`);
 //! 4. the result is compared with tract's own runner of the same bytes (`agree`).
@@ -19,6 +19,7 @@ mod error;
 mod fold;
 mod guard;
 mod limits;
+mod memory;
 mod network;
 mod oracle;
 mod random;
@@ -31,11 +32,11 @@ mod wire;
 mod common;
 
 pub use error::ImportError;
-pub use network::{Activation, Dense, InputScale, Network};
+pub use network::{Activation, Dense, InputScale, Network, Play};
 pub use oracle::Oracle;
 pub use random::Random;
 
-/// The shape that the service's contract asks for: float32 `[1, inputs]` to `[1, outputs]`.
+/// The shape that the service's contract asks for: float32 `[1, inputs]` to `[1, outputs]`, a memory's own ports not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expected {
     /// Width of the input row (118 for ravenposed).
@@ -54,11 +55,14 @@ pub struct Expected {
 pub fn import(bytes: &[u8], expected: &Expected) -> Result<Network, ImportError> {
     let mut checked = check::check(bytes, expected)?;
     let metadata = std::mem::take(&mut checked.metadata);
+    let plays = std::mem::take(&mut checked.plays);
     let norms_input = !checked.input_norms.is_empty();
+    let expected = &Expected { inputs: expected.inputs + plays.len(), ..*expected };
     guard::guarded(|| {
         let mut oracle = Oracle::load(&checked.proto, expected.inputs)?;
         let links = chain::read(&tract::declutter(checked, expected.inputs)?, expected)?;
         let mut folded = fold::fold(links, expected.inputs, metadata)?;
+        folded.network.plays = plays;
         if norms_input {
             // tract's runner writes the normalisation as `a * x + b`, though the imported network does not.
             folded.cancelling.fill(true);

@@ -14,6 +14,15 @@ pub struct InputScale {
     pub scale: Vec<f32>,
 }
 
+/// A play of half width r: it follows its input x only where x leaves [y - r, y + r], so x - y tells where x came from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Play {
+    /// Index of the input that it follows.
+    pub input: usize,
+    /// r, in the unit of that input; finite and above 0.
+    pub half_width: f32,
+}
+
 /// The function after a layer's sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Activation {
@@ -76,10 +85,12 @@ pub struct Dense {
 /// A network of dense layers, each taking the previous one's outputs. Units of input and output are the caller's business.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
-    /// Numbers that [`Network::evaluate_f64`] takes.
+    /// Numbers that [`Network::evaluate_f64`] takes: the file's inputs, and behind them one place x - y per play.
     pub input_width: usize,
     /// Numbers that it gives.
     pub output_width: usize,
+    /// The memory in front of the first layer; empty where the file has none.
+    pub plays: Vec<Play>,
     /// Step before the first layer, absent when it would change nothing.
     pub input_scale: Option<InputScale>,
     /// At least one layer.
@@ -143,6 +154,7 @@ impl Network {
         Self {
             input_width: widths.first().copied().unwrap_or(0),
             output_width: widths.last().copied().unwrap_or(0),
+            plays: Vec::new(),
             input_scale: None,
             layers,
             metadata: BTreeMap::new(),

@@ -17,7 +17,7 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    /// Loads the model that [`import`] accepts from the same bytes.
+    /// Loads the model that [`import`] accepts from the same bytes; a memory in front of the layers is left to the caller.
     ///
     /// # Errors
     ///
@@ -25,7 +25,7 @@ impl Oracle {
     pub fn new(bytes: &[u8], expected: &Expected) -> Result<Self, ImportError> {
         drop(import(bytes, expected)?);
         let checked = check::check(bytes, expected)?;
-        guard::guarded(|| Self::load(&checked.proto, expected.inputs))
+        guard::guarded(|| Self::load(&checked.proto, expected.inputs + checked.plays.len()))
     }
 
     /// Loads a checked model; the caller guards against tract's panics.
@@ -35,7 +35,7 @@ impl Oracle {
         Ok(Self { state: plan.spawn().map_err(&stage)?, inputs })
     }
 
-    /// Evaluates one input row of `Expected::inputs` numbers in float32.
+    /// Evaluates one input row in float32: `Expected::inputs` numbers, and one per play of a memory.
     ///
     /// # Errors
     ///

@@ -287,3 +287,84 @@ fn listing_weights_among_the_inputs_is_allowed() {
     let network = import(&bytes(&model), &Expected { inputs: 3, outputs: 2 }).unwrap();
     assert_eq!(network.layers.len(), 1);
 }
+
+const PLAYS: [(i64, f32); 2] = [(4, 0.25), (0, 1.5)];
+
+/// Five raw inputs and two plays in front of a network of seven inputs.
+fn remembering() -> ModelProto {
+    common::remember(Chain::new(7).with("Sub", &[0.5; 7]).dense(6).activate("Tanh").dense(3).finish(), 5, &PLAYS)
+}
+
+fn import_remembering(model: &ModelProto) -> Result<Network, ImportError> {
+    import(&bytes(model), &Expected { inputs: 5, outputs: 3 })
+}
+
+#[test]
+fn a_memory_is_cut_off_and_the_layers_behind_it_are_the_same() {
+    let network = import_remembering(&remembering()).unwrap_or_else(|e| panic!("{e}"));
+    let plays: Vec<(i64, f32)> = network.plays.iter().map(|play| (play.input as i64, play.half_width)).collect();
+    assert_eq!(plays, PLAYS);
+    let bare = Chain::new(7).with("Sub", &[0.5; 7]).dense(6).activate("Tanh").dense(3).finish();
+    let bare = import(&bytes(&bare), &Expected { inputs: 7, outputs: 3 }).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((network.input_width, &network.layers, &network.input_scale), (7, &bare.layers, &bare.input_scale));
+    assert!(bare.plays.is_empty());
+    let mut oracle = Oracle::new(&bytes(&remembering()), &Expected { inputs: 5, outputs: 3 }).unwrap();
+    let input = [0.1, -0.7, 2.0, 0.4, 1.0, 0.2, -1.1];
+    for (y, tract) in network.evaluate_f64(&input).iter().zip(oracle.run(&input).unwrap()) {
+        assert!((y - f64::from(tract)).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn a_memory_of_another_form_is_refused_whatever_is_different() {
+    type Change = fn(&mut tract_onnx::pb::GraphProto);
+    fn stored<'a>(graph: &'a mut tract_onnx::pb::GraphProto, name: &str) -> &'a mut TensorProto {
+        graph.initializer.iter_mut().find(|one| one.name == name).unwrap()
+    }
+    let changes: [(&str, Change); 18] = [
+        ("node 3 is not the Max", |graph| graph.node[3].op_type = "Min".into()),
+        ("node 1 is not the Sub", |graph| graph.node[1].input.swap(0, 1)),
+        ("node 4 is not the Min", |graph| graph.node.swap(4, 5)),
+        ("node 0 is not the Gather", |graph| graph.node[0].attribute[0].i = 0),
+        ("node 7 is not the Concat", |graph| graph.node[7].attribute.clear()),
+        ("node 6 is not the Sub", |graph| graph.node[6].attribute.push(int("axis", 1))),
+        ("node 2 is not the Add", |graph| graph.node[2].domain = "other".into()),
+        ("a play of half width 0", |graph| stored(graph, "memory.half_widths").raw_data[..4].fill(0)),
+        ("a play of half width NaN", |graph| {
+            stored(graph, "memory.half_widths").raw_data[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+        }),
+        ("on input 5", |graph| stored(graph, "memory.features").raw_data[0] = 5),
+        ("on input -1", |graph| stored(graph, "memory.features").raw_data[..8].fill(0xff)),
+        ("memory.features is not", |graph| stored(graph, "memory.features").raw_data.truncate(15)),
+        ("names not 1 to 64", |graph| stored(graph, "memory.features").dims = vec![i64::MAX]),
+        ("memory does not begin with zeros", |graph| stored(graph, "memory").raw_data[3] = 0x3f),
+        ("remembered does not begin with zeros", |graph| stored(graph, "remembered").raw_data[0] = 1),
+        ("not stored exactly once", |graph| graph.initializer.retain(|one| one.name != "memory.half_widths")),
+        ("remembered is no input", |graph| graph.input.retain(|one| one.name != "remembered")),
+        ("the graph's input is not [1, 5]", |graph| graph.input[0] = port("raw", None, 6)),
+    ];
+    for (what, change) in changes {
+        let mut model = remembering();
+        change(model.graph.as_mut().unwrap());
+        match import_remembering(&model) {
+            Err(ImportError::Memory { found }) => assert!(found.contains(what), "{found} for {what}"),
+            other => panic!("{other:?} for {what}"),
+        }
+    }
+}
+
+#[test]
+fn a_memory_that_the_layers_do_not_wait_for_is_refused() {
+    // The first layer takes the raw features past the memory.
+    let mut model = remembering();
+    model.graph.as_mut().unwrap().node[8].input[0] = "raw".into();
+    assert!(matches!(import_remembering(&model), Err(ImportError::Missing { .. })));
+    // Only half of it is there: an input that is stored, or a second output.
+    let mut model = remembering();
+    let graph = model.graph.as_mut().unwrap();
+    graph.output.retain(|one| one.name != "memory_out");
+    assert!(import_remembering(&model).is_ok_and(|network| network.plays.len() == 2), "nobody has to read it out");
+    let mut model = remembering();
+    model.graph.as_mut().unwrap().node.truncate(8);
+    assert!(import_remembering(&model).is_err());
+}

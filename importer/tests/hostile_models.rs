@@ -33,32 +33,47 @@ fn refused_small(change: impl FnOnce(&mut ModelProto)) -> ImportError {
     refusal_of(&model, SMALL)
 }
 
+/// Of the same width, with two plays in front.
+fn remembering() -> ModelProto {
+    common::remember(
+        Chain::new(7).with("Sub", &[1.0; 7]).dense(4).norm().activate("Sigmoid").dense(3).finish(),
+        5,
+        &[(0, 0.5), (3, 2.0)],
+    )
+}
+
 #[test]
 fn every_truncation_is_refused_or_still_whole() {
-    let whole = bytes(&small());
-    let network = import(&whole, &SMALL).unwrap();
-    for length in 0..whole.len() {
-        match import(&whole[..length], &SMALL) {
-            Err(error) => assert_one_line(&error),
-            // Only the last top-level fields, which come after graph and operator set, can go unnoticed: the metadata.
-            Ok(cut) => assert_eq!((cut.layers, cut.input_scale), (network.layers.clone(), network.input_scale.clone())),
+    for model in [small(), remembering()] {
+        let whole = bytes(&model);
+        let network = import(&whole, &SMALL).unwrap();
+        for length in 0..whole.len() {
+            match import(&whole[..length], &SMALL) {
+                Err(error) => assert_one_line(&error),
+                // Only the last top-level fields, which come after graph and operator set, can go unnoticed: the metadata.
+                Ok(cut) => assert_eq!(Network { metadata: network.metadata.clone(), ..cut }, network),
+            }
         }
     }
 }
 
 #[test]
 fn ten_thousand_bit_flips_never_panic_or_give_a_number_that_is_not_finite() {
-    let whole = bytes(&small());
+    let models = [bytes(&small()), bytes(&remembering())];
     let seed = 2026;
     let mut random = Random(seed);
     let (mut accepted, start) = (0, Instant::now());
     for round in 0..10_000 {
-        let mut flipped = whole.clone();
+        let mut flipped = models[round % 2].clone();
         let bit = random.next() as usize % (flipped.len() * 8);
         flipped[bit / 8] ^= 1 << (bit % 8);
         match import(&flipped, &SMALL) {
             Ok(network) => {
                 accepted += 1;
+                assert!(
+                    network.plays.iter().all(|play| play.input < 5 && play.half_width > 0.0),
+                    "seed {seed}, round {round}, bit {bit}"
+                );
                 assert!(is_finite(&network), "seed {seed}, round {round}, bit {bit}");
             }
             Err(error) => assert_one_line(&error),

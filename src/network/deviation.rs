@@ -54,9 +54,9 @@ impl fmt::Display for Format {
 ///
 /// # Errors
 /// [`NotExactEnough`] if the format asked for deviates by more. Float32 is always allowed: it is the network as it came.
-pub fn choose(network: &Network, golden: &[&[f32]], limit: f64, asked: Option<Format>) -> Result<Choice, NotExactEnough> {
+pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<Format>) -> Result<Choice, NotExactEnough> {
     let mut random = Random::new(0x0005_EED0_F0DD);
-    let mut inputs: Vec<Vec<f32>> = golden.iter().map(|input| input.to_vec()).collect();
+    let mut inputs: Vec<Vec<f32>> = golden.to_vec();
     inputs.extend((0..RANDOM_INPUTS).map(|_| random_input(network, &mut random)));
     let truths: Vec<Vec<f64>> = inputs.iter().map(|input| network.evaluate_f64(input)).collect();
     let candidates = asked.as_ref().map_or(&CANDIDATES[..], std::slice::from_ref);

@@ -70,6 +70,7 @@ pub(crate) fn model() -> ArmModel<Fake> {
         id: 0x0123_4567_89ab_cdef,
         bound_um: BOUND_UM,
         bound95_um: [300.0, 400.0, 500.0],
+        bound95_unsettled_um: [f64::NAN; 3],
         untrained: false,
     }))
 }

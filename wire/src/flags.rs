@@ -76,6 +76,8 @@ pub mod flag {
     pub const SAW_DUPLICATE: u32 = 1 << 22;
     /// Information: the correction dropped to zero in this message (`reset_count` went up).
     pub const RESET: u32 = 1 << 23;
+    /// Information: the model's memory has not seen every joint move far enough yet; the bound is the one for that.
+    pub const MEMORY_UNSETTLED: u32 = 1 << 24;
 }
 
 /// The flags that mean fallback.
@@ -91,7 +93,7 @@ pub struct Flag {
 }
 
 /// Every flag with its name, lowest bit first.
-pub const FLAGS: [Flag; 23] = [
+pub const FLAGS: [Flag; 24] = [
     Flag { bit: flag::INPUT_NOT_FINITE, name: "input_not_finite" },
     Flag { bit: flag::INPUT_STALE, name: "input_stale" },
     Flag { bit: flag::INPUT_IMPOSSIBLE, name: "input_impossible" },
@@ -115,6 +117,7 @@ pub const FLAGS: [Flag; 23] = [
     Flag { bit: flag::UNTRAINED_ALLOWED, name: "untrained_allowed" },
     Flag { bit: flag::SAW_DUPLICATE, name: "saw_duplicate" },
     Flag { bit: flag::RESET, name: "reset" },
+    Flag { bit: flag::MEMORY_UNSETTLED, name: "memory_unsettled" },
 ];
 
 /// The names of the bits that are set, lowest first.

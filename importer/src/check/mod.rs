@@ -12,26 +12,31 @@ use prost::Message;
 use tract_onnx::pb::{GraphProto, ModelProto};
 
 use crate::error::ImportError;
-use crate::{Expected, limits, text, wire};
+use crate::network::Play;
+use crate::{Expected, limits, memory, text, wire};
 
 /// A model that holds only known operators, complete finite tensors and one float32 input and output of the expected widths.
 pub(crate) struct Checked {
     pub(crate) proto: ModelProto,
     pub(crate) metadata: BTreeMap<String, String>,
+    /// Of the memory that stood in front of what `proto` still has.
+    pub(crate) plays: Vec<Play>,
     /// Indices of batch normalisations that take the network's own input.
     pub(crate) input_norms: Vec<usize>,
 }
 
 pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, ImportError> {
-    let proto = decode(bytes)?;
+    let mut proto = decode(bytes)?;
     sections(&proto)?;
     opset(&proto)?;
     let metadata = metadata(&proto)?;
-    let graph = proto.graph.as_ref().ok_or(ImportError::NoGraph)?;
+    let graph = proto.graph.as_mut().ok_or(ImportError::NoGraph)?;
     counts(graph)?;
-    let input = signature::check(graph, expected)?;
+    let plays = memory::cut(graph, expected.inputs)?;
+    let expected = Expected { inputs: expected.inputs + plays.len(), ..*expected };
+    let input = signature::check(graph, &expected)?;
     let input_norms = nodes::check(graph, input)?;
-    Ok(Checked { proto, metadata, input_norms })
+    Ok(Checked { proto, metadata, plays, input_norms })
 }
 
 fn decode(bytes: &[u8]) -> Result<ModelProto, ImportError> {

@@ -196,6 +196,56 @@ pub(crate) fn small() -> ModelProto {
         .finish()
 }
 
+/// Puts a memory in front of a network of `inputs` + `plays.len()` inputs, as `ravenpose train` does.
+pub(crate) fn remember(mut model: ModelProto, inputs: usize, plays: &[(i64, f32)]) -> ModelProto {
+    let one = Some(dimension::Value::DimValue(1));
+    let graph = model.graph.as_mut().unwrap();
+    let own = std::mem::replace(&mut graph.input[0], port("raw", one.clone(), inputs as i64)).name;
+    let n = plays.len() as i64;
+    graph.input.push(port("memory", one.clone(), n));
+    graph.input.push(port("remembered", one.clone(), 1));
+    graph.output.push(port("memory_out", one, n));
+    let widths: Vec<f32> = plays.iter().map(|(_, width)| *width).collect();
+    let features = plays.iter().flat_map(|(feature, _)| feature.to_le_bytes()).collect();
+    graph.initializer.push(tensor("memory", &[1, n], &vec![0.0; plays.len()]));
+    graph.initializer.push(tensor("memory.half_widths", &[n], &widths));
+    let plain = |name: &str, dims: &[i64], data_type: i32, raw_data: Vec<u8>| TensorProto {
+        name: name.into(),
+        dims: dims.to_vec(),
+        data_type,
+        raw_data,
+        ..Default::default()
+    };
+    graph.initializer.push(plain("memory.features", &[n], 7, features));
+    graph.initializer.push(plain("remembered", &[1, 1], 9, vec![0]));
+    let nodes: [(&str, &[&str], &str); 8] = [
+        ("Gather", &["raw", "memory.features"], "memory.x"),
+        ("Sub", &["memory.x", "memory.half_widths"], "memory.lower"),
+        ("Add", &["memory.x", "memory.half_widths"], "memory.upper"),
+        ("Max", &["memory", "memory.lower"], "memory.above"),
+        ("Min", &["memory.above", "memory.upper"], "memory.moved"),
+        ("Where", &["remembered", "memory.moved", "memory.x"], "memory_out"),
+        ("Sub", &["memory.x", "memory_out"], "memory.places"),
+        ("Concat", &["raw", "memory.places"], "memory.inputs"),
+    ];
+    let made = nodes.iter().map(|(op_type, input, output)| NodeProto {
+        name: format!("{output}.node"),
+        op_type: (*op_type).into(),
+        input: input.iter().map(|name| (*name).to_owned()).collect(),
+        output: vec![(*output).to_owned()],
+        attribute: if matches!(*op_type, "Gather" | "Concat") { vec![int("axis", 1)] } else { Vec::new() },
+        ..Default::default()
+    });
+    let made: Vec<NodeProto> = made.collect();
+    for node in &mut graph.node {
+        for input in node.input.iter_mut().filter(|input| **input == own) {
+            "memory.inputs".clone_into(input);
+        }
+    }
+    graph.node.splice(0..0, made);
+    model
+}
+
 fn floats(tensor: &TensorProto) -> Vec<f64> {
     tensor.raw_data.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }

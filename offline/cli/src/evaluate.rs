@@ -95,5 +95,11 @@ fn words(report: &Report) -> String {
         "95 % bound holds in {:.1} % (by run {:.1} to {:.1} %); out of range {:.2} %, out of domain {:.2} % of the rows",
         trust.coverage_all, trust.coverage_of_runs.0, trust.coverage_of_runs.1, trust.out_of_range, trust.out_of_domain
     ));
+    if let Some(unsettled) = &trust.unsettled {
+        lines.push(format!(
+            "memory begun less than 8 s before ({} rows): {:.3} RMS left, its own bound holds in {:.1} %",
+            unsettled.rows, unsettled.rms, unsettled.coverage
+        ));
+    }
     lines.join("\n") + "\n"
 }

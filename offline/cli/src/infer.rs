@@ -1,19 +1,21 @@
-//! `ravenpose infer`: the service's own plan on rows of a CSV file.
+//! `ravenpose infer`: the service's own plan on rows of a CSV file. Each row stands for itself, as in any ONNX runtime that is given
+//! the 118 features alone; with `--in-order` a model's memory goes from row to row as in the service.
 
 use crate::output;
-use ravenpose::model;
+use ravenpose::cycle::Estimator;
+use ravenpose::model::{self, Estimate};
 use ravenpose::network::{Format, choose};
 use std::path::Path;
 use std::process::ExitCode;
 
 const INPUTS: usize = 118;
 
-pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str) -> Result<ExitCode, String> {
+pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in_order: bool) -> Result<ExitCode, String> {
     let format: Format = weights.parse().map_err(|error| format!("--weights: {error}"))?;
     let network = model::network(model_path).map_err(|error| error.to_string())?;
     let choice =
         choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
-    let mut plan = choice.plan;
+    let mut estimate = Estimate::new(&network, choice.plan);
     if format != Format::F32 {
         let um = |mm: f64| mm * 1000.0;
         complain!(
@@ -39,7 +41,11 @@ pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str) ->
             let line = record.position().map_or(0, csv::Position::line);
             let features = features(&name.to_string(), line, &columns, &record)?;
             let mut error_mm = [0.0_f32; 3];
-            plan.run(&features, &mut error_mm);
+            if !in_order {
+                estimate.forget();
+            }
+            estimate.follow(&features);
+            estimate.run(&features, &mut error_mm);
             if let Some(value) = error_mm.iter().find(|value| !value.is_finite()) {
                 return Err(format!(
                     "{name}:{line}: the network's output is {value}; the row is far outside what it was trained on"
@@ -76,17 +82,15 @@ fn columns(name: &str, reader: &mut csv::Reader<std::fs::File>) -> Result<Vec<us
         .collect()
 }
 
-fn features(name: &str, line: u64, columns: &[usize], record: &csv::StringRecord) -> Result<Vec<f32>, String> {
-    columns
-        .iter()
-        .enumerate()
-        .map(|(input, &column)| {
-            let cell = record.get(column).unwrap_or("");
-            match cell.parse::<f32>() {
-                Ok(value) if value.is_finite() => Ok(value),
-                Ok(value) => Err(format!("{name}:{line}: in_{input} is {value}; inputs must be finite, remove the row")),
-                Err(_) => Err(format!("{name}:{line}: in_{input} is {cell:?}, not a number; correct or remove the row")),
-            }
-        })
-        .collect()
+fn features(name: &str, line: u64, columns: &[usize], record: &csv::StringRecord) -> Result<[f32; INPUTS], String> {
+    let mut features = [0.0; INPUTS];
+    for (input, (to, &column)) in features.iter_mut().zip(columns).enumerate() {
+        let cell = record.get(column).unwrap_or("");
+        match cell.parse::<f32>() {
+            Ok(value) if value.is_finite() => *to = value,
+            Ok(value) => return Err(format!("{name}:{line}: in_{input} is {value}; inputs must be finite, remove the row")),
+            Err(_) => return Err(format!("{name}:{line}: in_{input} is {cell:?}, not a number; correct or remove the row")),
+        }
+    }
+    Ok(features)
 }

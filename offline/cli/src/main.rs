@@ -49,6 +49,9 @@ enum Command {
         /// Weight format
         #[arg(long, default_value = "f32")]
         weights: String,
+        /// The rows are states in the order of time, one per period: a model with a memory remembers from row to row
+        #[arg(long)]
+        in_order: bool,
     },
     /// Turn a recording of any format into another one; the endings say which
     Convert {
@@ -218,7 +221,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
-        Command::Infer { model, input, out, weights } => infer::run(&model, &input, &out, &weights),
+        Command::Infer { model, input, out, weights, in_order } => infer::run(&model, &input, &out, &weights, in_order),
         Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),

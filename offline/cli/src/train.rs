@@ -2,7 +2,7 @@
 
 use crate::output;
 use ::training::commands::{self, Done, Event};
-use ::training::data::{Columns, Reading};
+use ::training::data::{Columns, Reading, memory};
 use ::training::preset::Recipe;
 use clap::Args;
 use std::io::IsTerminal;
@@ -19,7 +19,7 @@ pub(crate) struct Wish {
     #[arg(long)]
     out: PathBuf,
     /// Recipe
-    #[arg(long, default_value = "default", value_parser = ["default", "memory", "paper", "paper-code"])]
+    #[arg(long, default_value = "default", value_parser = ["default", "one-state", "paper", "paper-code"])]
     preset: String,
     /// Everything random: split, weights, order of rows
     #[arg(long, default_value_t = 0)]
@@ -91,7 +91,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         truth_hz: wish.truth_hz,
         truth_noise_mm: wish.truth_noise,
         seed: wish.seed,
-        memory: recipe.memory,
+        plays: if recipe.memory { memory::plays() } else { Vec::new() },
         arm: usize::from(wish.arm == "green"),
         columns,
     };

@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 use ravenpose::config::ModelSource;
+use ravenpose::cycle::Estimator;
 use ravenpose::model;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -99,7 +100,12 @@ fn runs_after_one_homing_have_its_offset_and_different_motions() {
 #[test]
 fn the_shipped_model_is_trained_and_the_service_takes_it() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/raven2-worn.onnx");
-    let card = model::load(&source(&path)).expect("the service's own checks").card;
+    let loaded = model::load(&source(&path)).expect("the service's own checks");
+    assert!(loaded.model.estimator.remembers());
+    let card = loaded.card;
+    for (settled, unsettled) in card.bound95_mm.iter().zip(card.bound95_unsettled_mm) {
+        assert!(*settled > 0.1 && unsettled > *settled, "{settled} {unsettled}");
+    }
     assert!(!card.untrained && card.trained_on.contains("140.0 minutes"), "{}", card.trained_on);
 }
 
@@ -109,7 +115,7 @@ fn evaluate_judges_on_unseen_runs_and_says_so() {
     let runs = folder.runs();
     let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
     let (out, report) = (folder.file("model.onnx"), folder.file("report"));
-    good(&ravenpose(&[&["train", "--preset", "memory", "--epochs", "2", "--out", text(&out), "--data"][..], &runs].concat()));
+    good(&ravenpose(&[&["train", "--preset", "default", "--epochs", "2", "--out", text(&out), "--data"][..], &runs].concat()));
     let said = good(&ravenpose(&[&["evaluate", "--model", text(&out), "--out", text(&report), "--data"][..], &runs].concat()));
     assert!(said.contains("1 runs") && said.contains("3 of its training and validation"), "{said}");
     for rival in ["raw", "fixed offset per run", "rigid + random forest", "Gaussian process", "2nd-order polynomial"] {

@@ -1,7 +1,7 @@
 //! The model card as metadata: what a network may be used for, in the form that `docs/models.md` lays down.
 
 use crate::chain::Chain;
-use crate::data::{Trajectory, memory};
+use crate::data::Trajectory;
 use crate::prepare::Prepared;
 use ravenpose_wire::{FEATURES, features};
 use std::collections::BTreeMap;
@@ -11,6 +11,8 @@ use std::fmt::Write;
 const UNITS: &str = "raven_state as published; position error in mm";
 /// Coverage that the bound is stated for.
 pub const COVERAGE: f64 = 0.95;
+/// Share of the unseen trajectories in which it is to be reached at least.
+const TRAJECTORIES: f64 = 0.75;
 /// The range of a feature is widened by this share of itself on both sides: an unseen trajectory of the same kind leaves the
 /// extremes of a finite sample now and then.
 const RANGE_MARGIN: f64 = 0.05;
@@ -47,25 +49,26 @@ pub struct Facts<'a> {
     pub more: BTreeMap<String, String>,
 }
 
-/// Half width per output that holds the true value with [`COVERAGE`]: split conformal on whole trajectories that took no part in
-/// the learning, each of which counts the same. The truth's own noise, where it is known, is taken out as a variance.
+/// Half width per output that holds the true value with [`COVERAGE`] in [`TRAJECTORIES`] of the unseen trajectories: split conformal
+/// over whole trajectories that took no part in the learning, since what differs from run to run is not in the rows of one. The
+/// truth's own noise, where it is known, is taken out as a variance. NaN where there are no rows.
 pub fn bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec<f64> {
     let outputs = chain.outputs();
     let noise = NORMAL_975 * truth_noise / (outputs.max(1) as f64).sqrt();
+    let estimates: Vec<Vec<f32>> = validation.iter().map(|one| chain.estimate(&one.inputs)).collect();
+    let runs = || validation.iter().zip(&estimates).filter(|(one, _)| one.rows() > 0);
     (0..outputs)
         .map(|output| {
-            let mut weighted: Vec<(f64, f64)> = validation
-                .iter()
-                .flat_map(|one| {
-                    let estimates = chain.estimate(&one.inputs);
-                    let weight = 1.0 / one.rows().max(1) as f64;
-                    let rest =
-                        move |row: usize| f64::from(one.labels[row * outputs + output] - estimates[row * outputs + output]).abs();
-                    (0..one.rows()).map(|row| (rest(row), weight)).collect::<Vec<_>>()
-                })
-                .collect();
-            let measured = quantile(&mut weighted, COVERAGE);
-            (measured * measured - noise * noise).max(0.0).sqrt()
+            let of_run = |(one, estimates): (&Trajectory, &Vec<f32>)| {
+                let rests = one.labels.iter().zip(estimates).skip(output).step_by(outputs);
+                let mut rests: Vec<(f64, f64)> = rests.map(|(label, estimate)| (f64::from(label - estimate).abs(), 1.0)).collect();
+                let measured = quantile(&mut rests, COVERAGE);
+                (measured * measured - noise * noise).max(0.0).sqrt()
+            };
+            let mut all: Vec<f64> = runs().map(of_run).collect();
+            all.sort_by(f64::total_cmp);
+            let place = (TRAJECTORIES * (all.len() + 1) as f64).ceil() as usize;
+            all.get(place.clamp(1, all.len().max(1)) - 1).copied().unwrap_or(f64::NAN)
         })
         .collect()
 }
@@ -93,8 +96,12 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     if is_raven {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
-        if facts.chain.inputs() > FEATURES {
-            put("memory", memory::property());
+        if !facts.chain.plays.is_empty() {
+            let unsettled: Vec<Trajectory> = facts.validation.iter().map(Trajectory::unsettled).collect();
+            let bounds = bounds(facts.chain, &unsettled, facts.truth_noise_mm);
+            if bounds.iter().all(|bound| bound.is_finite()) {
+                put("bound95_unsettled_mm", words(&bounds));
+            }
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
             facts
@@ -190,7 +197,7 @@ mod tests {
     fn the_bound_holds_19_of_20_true_values_though_the_truth_is_noisy() {
         let mut random = Random::new(8, 0);
         let layer = Dense { weight: Array2::zeros((3, 1)), bias: vec![0.0; 3], activation: Activation::Identity };
-        let chain = Chain { shift: vec![0.0], scale: vec![1.0], layers: vec![layer] };
+        let chain = Chain { shift: vec![0.0], scale: vec![1.0], layers: vec![layer], plays: Vec::new() };
         let (n, sd, noise) = (40_000, 0.6, 0.5);
         let exact: Vec<f32> = (0..3 * n).map(|_| (sd * random.normal()) as f32).collect();
         let mut one =

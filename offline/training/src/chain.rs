@@ -3,6 +3,7 @@
 use crate::network::Activation;
 use crate::train::Trained;
 use ndarray::{Array1, Array2, ArrayView2, linalg::general_mat_mul};
+use ravenpose::memory::Play;
 
 /// Rows that are evaluated at a time.
 const CHUNK_ROWS: usize = 4096;
@@ -27,11 +28,13 @@ pub struct Chain {
     pub scale: Vec<f32>,
     /// At least one.
     pub layers: Vec<Dense>,
+    /// The memory in front, whose places are the last inputs.
+    pub plays: Vec<Play>,
 }
 
 impl Chain {
     /// Folds normalisation, preparation, batch normalisation and the labels' unit into the layers, in double precision.
-    pub fn of(trained: &Trained) -> Self {
+    pub fn of(trained: &Trained, plays: &[Play]) -> Self {
         let prepared = &trained.prepared;
         let inputs = prepared.mean.len();
         let (mut before_weight, mut before_bias) = prepared.fold();
@@ -67,10 +70,11 @@ impl Chain {
             shift: prepared.mean.iter().map(|mean| *mean as f32).collect(),
             scale: (0..inputs).map(|input| prepared.scale(input) as f32).collect(),
             layers,
+            plays: plays.to_vec(),
         }
     }
 
-    /// Width of the input row.
+    /// Width of the input row, a memory's places included.
     pub fn inputs(&self) -> usize {
         self.shift.len()
     }
@@ -172,7 +176,7 @@ mod tests {
                     curves: Vec::new(),
                     seconds: 0.0,
                 };
-                let chain = Chain::of(&trained);
+                let chain = Chain::of(&trained, &[]);
                 for (a, b) in trained.estimate(&one.inputs).iter().zip(chain.estimate(&one.inputs)) {
                     assert!((a - b).abs() < 2e-4 * a.abs().max(1.0), "{place:?} {activation:?}: {a} {b}");
                 }

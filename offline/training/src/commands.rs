@@ -2,17 +2,19 @@
 
 use crate::card::{self, Facts};
 use crate::chain::Chain;
-use crate::data::{self, DataSet, Reading, Trajectory, memory};
+use crate::data::{self, DataSet, Reading, Trajectory};
 use crate::error::{TrainingError, hex, shown};
 use crate::preset::Recipe;
 use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
 use crate::{figures, onnx};
-use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// One row of training in so many has a memory that began a few seconds before.
+const YOUNG_EVERY: usize = 8;
 
 /// What is to be trained.
 #[derive(Debug, Clone)]
@@ -71,11 +73,12 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let count = |part: &[usize]| part.iter().map(|index| all_rows[*index]).sum();
     let rows = [count(&split.train), count(&split.validation), count(&split.test)];
     let trajectories = [split.train.len(), split.validation.len(), split.test.len()];
-    let parts = Parts::of(&mut set, &split);
+    let mut parts = Parts::of(&mut set, &split);
+    parts.train.iter_mut().for_each(|one| one.make_young(YOUNG_EVERY));
     let checkpoint = beside(wish.out, "checkpoint");
     let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
     let trained = train::train(&parts.train, &parts.validation, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
-    let chain = Chain::of(&trained);
+    let chain = Chain::of(&trained, &wish.reading.plays);
     let best = trained.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
     let (epoch, validation_rms) = best.map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
     let facts = Facts {
@@ -202,11 +205,6 @@ impl Model {
         let bytes = fs::read(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
         let (chain, card) = onnx::read(&bytes).map_err(wrong)?;
         Ok(Self { chain, card })
-    }
-
-    /// Does it want the memory of the recent motion behind the 118 features?
-    pub fn has_memory(&self) -> bool {
-        self.chain.inputs() == FEATURES + memory::MEMORY
     }
 
     /// A property of the card as a number.

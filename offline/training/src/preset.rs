@@ -54,7 +54,7 @@ impl Recipe {
             "paper" => Some(Self::paper()),
             "paper-code" => Some(Self::paper_code()),
             "default" => Some(Self::ours()),
-            "memory" => Some(Self { name: name.to_owned(), memory: true, ..Self::ours() }),
+            "one-state" => Some(Self { name: name.to_owned(), memory: false, ..Self::ours() }),
             _ => None,
         }
     }
@@ -95,12 +95,12 @@ impl Recipe {
     /// thousands of rows instead of hundreds of thousands.
     #[must_use]
     pub fn for_tables(self) -> Self {
-        let ours = self.name == "default" || self.name == "memory";
+        let ours = self.name == "default" || self.name == "one-state";
         let small = if ours { Self { hidden: vec![48, 48], batch: 64, epochs: 80, decay: 0.1, ..self } } else { self };
         Self { preparation: Preparation::Standard, memory: false, ..small }
     }
 
-    /// The best found here for one state: docs/training.md.
+    /// The best found here: docs/training.md.
     pub fn ours() -> Self {
         Self {
             name: "default".to_owned(),
@@ -108,7 +108,7 @@ impl Recipe {
             activation: Activation::Tanh,
             norm: NormPlace::None,
             preparation: Preparation::Physical,
-            memory: false,
+            memory: true,
             batch: 256,
             rate: 2e-3,
             schedule: Schedule::Cosine,

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Folder, runs, small};
+use common::{Folder, plays, runs, small};
 use training::commands::{self, Event, Model, Wish};
 use training::data::{self, Reading};
 use training::evaluate;
@@ -58,14 +58,15 @@ fn a_checkpoint_of_other_data_is_refused() {
 fn the_card_says_what_the_service_wants_and_which_runs_it_has_seen() {
     let folder = Folder::new("card");
     let files = runs(&folder, 4, 3.0, ".mcap");
-    for preset in ["default", "memory"] {
+    for preset in ["default", "one-state"] {
         let (out, recipe) = (folder.file("model.onnx"), small(preset));
-        let reading = Reading { truth_noise_mm: 0.5, memory: recipe.memory, ..Reading::default() };
+        let reading = Reading { truth_noise_mm: 0.5, plays: plays(&recipe), ..Reading::default() };
         let done =
             commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
         assert_eq!(done.trajectories, [2, 1, 1]);
         let model = Model::read(&out).expect("model");
-        assert_eq!(model.has_memory(), preset == "memory");
+        assert_eq!(model.chain.plays.len(), if preset == "default" { 21 } else { 0 });
+        assert_eq!(model.words("ravenpose.bound95_unsettled_mm").len(), if preset == "default" { 3 } else { 0 });
         for (key, count) in [
             ("feature_min", 118),
             ("feature_max", 118),
@@ -90,6 +91,7 @@ fn the_card_says_what_the_service_wants_and_which_runs_it_has_seen() {
         let report = evaluate::evaluate(&report, &mut |_| {}).expect("report");
         assert_eq!((report.runs.len(), report.runs_of_training), (1, 3));
         assert!(report.methods.iter().all(|method| method.exact.vector.rms.is_finite()));
+        assert_eq!(report.trust.unsettled.is_some(), preset == "default");
         let page = std::fs::read_to_string(folder.file("report/report.html")).expect("page");
         assert!(page.contains("Methods side by side") && !page.contains("src=\"http") && !page.contains("<script"));
         let known: Vec<_> = files.iter().filter(|file| !report.runs.iter().any(|run| file.ends_with(run))).cloned().collect();

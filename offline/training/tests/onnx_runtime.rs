@@ -6,7 +6,7 @@
 
 mod common;
 
-use common::{Folder, python, runs, small};
+use common::{Folder, plays, python, runs, small};
 use std::process::Command;
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading};
@@ -15,11 +15,19 @@ const SCRIPT: &str = "
 import sys, numpy, onnx, onnxruntime
 model = onnx.load(sys.argv[1])
 onnx.checker.check_model(model, full_check=True)
-rows = numpy.fromfile(sys.argv[2], dtype='<f4').reshape(-1, int(sys.argv[4]))
+rows = numpy.fromfile(sys.argv[2], dtype='<f4').reshape(-1, 118)
 session = onnxruntime.InferenceSession(sys.argv[1], providers=['CPUExecutionProvider'])
-name = session.get_inputs()[0].name
-out = numpy.concatenate([session.run(None, {name: row[None]})[0] for row in rows])
-out.astype('<f4').tofile(sys.argv[3])
+assert [port.name for port in session.get_inputs()] == ['input'], 'one input that must be given'
+remembers = {port.name for port in session.get_overridable_initializers()} >= {'memory', 'remembered'}
+assert remembers == (sys.argv[4] == 'remembers')
+memory, alone, in_order = {}, [], []
+for row in rows:
+    alone.append(session.run(['output'], {'input': row[None]})[0])
+    found = session.run(None, {'input': row[None], **memory})
+    in_order.append(found[0])
+    if remembers:
+        memory = {'memory': found[1], 'remembered': numpy.array([[True]])}
+numpy.concatenate(alone + in_order).astype('<f4').tofile(sys.argv[3])
 ";
 
 #[test]
@@ -35,26 +43,31 @@ fn onnx_runtime_gives_what_the_card_says() {
     }
     let folder = Folder::new("runtime");
     let files = runs(&folder, 3, 3.0, ".mcap");
-    for preset in ["default", "memory", "paper", "paper-code"] {
+    for preset in ["default", "one-state", "paper", "paper-code"] {
         let (out, recipe) = (folder.file("model.onnx"), small(preset));
-        let reading = Reading { memory: recipe.memory, ..Reading::default() };
+        // Every state has a truth in these runs, so that a memory fed with the rows has seen all of them.
+        let reading = Reading { plays: plays(&recipe), truth_hz: 1000.0, ..Reading::default() };
         commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
         let chain = Model::read(&out).expect("model").chain;
         let set = data::read(&files, &reading, &mut |_, _| {}).expect("runs");
-        let inputs = &set.trajectories[0].inputs;
-        let bytes: Vec<u8> = inputs.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let rows: Vec<&[f32]> = set.trajectories[0].inputs.chunks_exact(set.inputs()).collect();
+        assert!(rows.len() > 2900, "{}", rows.len());
+        let bytes: Vec<u8> = rows.iter().flat_map(|row| &row[..118]).flat_map(|value| value.to_le_bytes()).collect();
         std::fs::write(folder.file("in"), bytes).expect("inputs");
-        let width = set.inputs().to_string();
         let ran = Command::new(&python)
             .args(["-c", SCRIPT])
             .args([&out, &folder.file("in"), &folder.file("out")])
-            .arg(width)
+            .arg(if recipe.memory { "remembers" } else { "one state" })
             .output()
             .expect("python");
         assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
         let found = std::fs::read(folder.file("out")).expect("outputs");
         let found = found.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]]));
-        let expected = inputs.chunks_exact(set.inputs()).flat_map(|row| chain.estimate_exactly(row));
+        // First each row for itself, as a memory that has seen nothing else; then in order.
+        let alone = rows.iter().map(|row| [&row[..118], &vec![0.0; row.len() - 118]].concat());
+        let in_order = rows.iter().map(|row| row.to_vec());
+        let expected: Vec<f64> = alone.chain(in_order).flat_map(|row| chain.estimate_exactly(&row)).collect();
+        assert_eq!(found.len(), expected.len(), "{preset}");
         let mut worst = 0.0_f64;
         for (found, expected) in found.zip(expected) {
             worst = worst.max((f64::from(found) - expected).abs() / expected.abs().max(1.0));

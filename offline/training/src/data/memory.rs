@@ -1,9 +1,6 @@
-//! Memory of the recent motion: where each reported joint stands within plays of several widths.
-//!
-//! What a cable hangs back by depends on where the joint came from. A play operator of half width r keeps just that: it follows
-//! its input only where the input leaves [y - r, y + r], so x - y tells direction and distance since the last turn.
+//! Which plays a model of a RAVEN-II has in front of its network; how they work is the service's own (`ravenpose::memory`).
 
-use ravenpose_wire::FEATURES;
+use ravenpose::memory::Play;
 
 /// First feature of `jpos`.
 const JPOS: usize = 56;
@@ -20,78 +17,18 @@ const PLAYS: [(usize, [f64; PER_JOINT]); 7] = [
     (6, [0.04, 0.1, 0.3]),
     (7, [0.04, 0.1, 0.3]),
 ];
-/// Numbers that a memory adds to the inputs.
-pub const MEMORY: usize = PER_JOINT * PLAYS.len();
 
-/// All plays of one arm, fed with every state.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Memory {
-    held: Option<[f64; MEMORY]>,
+/// All plays, in the unit of the features.
+pub fn plays() -> Vec<Play> {
+    let of = |(slot, widths): &(usize, [f64; PER_JOINT])| {
+        let input = JPOS + slot;
+        widths.map(|width| Play { input, half_width: width.to_degrees() as f32 })
+    };
+    PLAYS.iter().flat_map(of).collect()
 }
 
-/// Feature and half width of each play, in the unit of the feature.
-fn plays() -> impl Iterator<Item = (usize, f64)> {
-    PLAYS.iter().flat_map(|(slot, widths)| widths.iter().map(move |width| (JPOS + slot, width.to_degrees())))
-}
-
-impl Memory {
-    /// The plays follow one more state; its 118 features.
-    pub fn follow(&mut self, features: &[f32; FEATURES]) {
-        let mut all = plays().map(|(feature, _)| f64::from(features[feature]));
-        let held = self.held.get_or_insert_with(|| std::array::from_fn(|_| all.next().unwrap_or_default()));
-        for (held, (feature, width)) in held.iter_mut().zip(plays()) {
-            let x = f64::from(features[feature]);
-            // Not clamp, which panics on NaN.
-            *held = held.max(x - width).min(x + width);
-        }
-    }
-
-    /// Where the newest state stands within each play, x - y, in the unit of the features.
-    pub fn places(&self, features: &[f32; FEATURES]) -> [f32; MEMORY] {
-        let mut out = [0.0; MEMORY];
-        if let Some(held) = &self.held {
-            for ((out, held), (feature, _)) in out.iter_mut().zip(held).zip(plays()) {
-                *out = (f64::from(features[feature]) - held) as f32;
-            }
-        }
-        out
-    }
-}
-
-/// Names of the numbers that a memory adds.
-pub fn names() -> Vec<String> {
-    PLAYS.iter().flat_map(|(slot, widths)| widths.iter().map(move |width| format!("play(jpos[{slot}], {width})"))).collect()
-}
-
-/// Feature and half width of each play in the feature's unit: `ravenpose.memory` of a card, for whoever runs the model.
-pub fn property() -> String {
-    plays().map(|(feature, width)| format!("{feature}:{width}")).collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn at(joint_1_deg: f32) -> [f32; FEATURES] {
-        let mut features = [0.0; FEATURES];
-        features[JPOS] = joint_1_deg;
-        features
-    }
-
-    #[test]
-    fn a_play_tells_from_which_side_a_joint_came() {
-        let width = plays().next().expect("play").1 as f32;
-        for (way, place) in [([1.0, 5.0, 4.7], -width), ([5.0, 1.0, 1.3], width)] {
-            let mut memory = Memory::default();
-            for step in way {
-                memory.follow(&at(step));
-            }
-            // 0.3 degrees back is more than twice 0.086 degrees, so it has crossed to the other flank.
-            let found = memory.places(&at(way[2]))[0];
-            assert!((found - place).abs() < 1e-6, "{found} {place}");
-        }
-        let mut memory = Memory::default();
-        memory.follow(&at(3.0));
-        assert_eq!(memory.places(&at(3.0)), [0.0; MEMORY]);
-    }
+/// Names of the numbers that plays add to the inputs.
+pub fn names(plays: &[Play]) -> Vec<String> {
+    let name = |play: &Play| format!("play({}, {})", ravenpose_wire::features::name(play.input), play.half_width);
+    plays.iter().map(name).collect()
 }

@@ -7,6 +7,7 @@ mod table;
 
 use crate::error::{TrainingError, hex};
 use crate::random::Random;
+use ravenpose::memory::Play;
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
 use std::path::PathBuf;
@@ -27,6 +28,10 @@ pub struct Trajectory {
     pub labels: Vec<f32>,
     /// The same without the noise that was added; equal to `labels` where none was.
     pub exact: Vec<f32>,
+    /// Row-major, as many numbers per row as a memory adds: what those would be had it begun a few seconds before.
+    pub young_places: Vec<f32>,
+    /// Per row: had such a memory not settled yet?
+    pub is_unsettled: Vec<bool>,
 }
 
 impl Trajectory {
@@ -48,6 +53,37 @@ impl Trajectory {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time_s.len()
+    }
+
+    /// The rows that a memory had not settled in, as it had them then; no rows where there is no memory.
+    #[must_use]
+    pub fn unsettled(&self) -> Self {
+        let places = self.young_places.len() / self.rows().max(1);
+        let (inputs, outputs) = (self.inputs.len() / self.rows().max(1), self.labels.len() / self.rows().max(1));
+        let mut found = Self { name: self.name.clone(), ..Self::default() };
+        if places == 0 {
+            return found;
+        }
+        for row in (0..self.rows()).filter(|row| self.is_unsettled[*row]) {
+            found.time_s.push(self.time_s[row]);
+            found.inputs.extend_from_slice(&self.inputs[row * inputs..(row + 1) * inputs - places]);
+            found.inputs.extend_from_slice(&self.young_places[row * places..(row + 1) * places]);
+            found.labels.extend_from_slice(&self.labels[row * outputs..(row + 1) * outputs]);
+            found.exact.extend_from_slice(&self.exact[row * outputs..(row + 1) * outputs]);
+        }
+        found
+    }
+
+    /// Gives every so-manieth row the memory that began a few seconds before, so that a network learns what to make of one.
+    pub fn make_young(&mut self, every: usize) {
+        let places = self.young_places.len() / self.rows().max(1);
+        let inputs = self.inputs.len() / self.rows().max(1);
+        if places > 0 {
+            for row in (0..self.rows()).step_by(every) {
+                self.inputs[(row + 1) * inputs - places..(row + 1) * inputs]
+                    .copy_from_slice(&self.young_places[row * places..(row + 1) * places]);
+            }
+        }
     }
 }
 
@@ -92,8 +128,8 @@ pub struct Reading {
     pub truth_noise_mm: f64,
     /// Seed of that noise.
     pub seed: u64,
-    /// Append the memory of the recent motion to the inputs of a RAVEN-II.
-    pub memory: bool,
+    /// Memory of the recent motion that is appended to the inputs of a RAVEN-II.
+    pub plays: Vec<Play>,
     /// Arm of a RAVEN-II: 0 gold, 1 green.
     pub arm: usize,
     /// Named columns instead of the state of a RAVEN-II.
@@ -102,7 +138,7 @@ pub struct Reading {
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, memory: false, arm: 0, columns: None }
+        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, plays: Vec::new(), arm: 0, columns: None }
     }
 }
 
@@ -116,7 +152,7 @@ const NOISE: u64 = 11;
 pub fn read(files: &[PathBuf], reading: &Reading, seen: &mut dyn FnMut(usize, usize)) -> Result<DataSet, TrainingError> {
     let mut data = match &reading.columns {
         Some(columns) => table::empty(columns),
-        None => raven::empty(reading.memory),
+        None => raven::empty(&reading.plays),
     };
     for (index, file) in files.iter().enumerate() {
         let mut trajectory = match &reading.columns {

@@ -1,9 +1,10 @@
 //! A RAVEN-II's recordings: full states with truth become `raven118-v1` and the tip's error in mm.
 
-use super::memory::{self, Memory};
+use super::memory;
 use super::{DataSet, Reading, Trajectory};
 use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
+use ravenpose::memory::{Memory, Play};
 use ravenpose_wire::{FEATURES, RavenState, features};
 use recordings::open::{Opened, open};
 use recordings::stream::{Record, Truth};
@@ -13,12 +14,13 @@ use std::path::Path;
 const APART_MAX_NS: i64 = 5_000_000;
 /// No arm of half a metre is off by more: units or frames contradict each other then.
 const ERROR_MAX_MM: f64 = 100.0;
+/// A second memory begins anew after so many seconds, one after the other: what a service knows soon after its start.
+const YOUNG_S: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
 /// A data set of a RAVEN-II without trajectories.
-pub(super) fn empty(with_memory: bool) -> DataSet {
-    let memory = if with_memory { memory::names() } else { Vec::new() };
+pub(super) fn empty(plays: &[Play]) -> DataSet {
     DataSet {
-        input_names: (0..FEATURES).map(features::name).chain(memory).collect(),
+        input_names: (0..FEATURES).map(features::name).chain(memory::names(plays)).collect(),
         output_names: ["error_x_mm", "error_y_mm", "error_z_mm"].map(str::to_owned).to_vec(),
         is_raven: true,
         ..DataSet::default()
@@ -60,7 +62,11 @@ struct Pairing<'a> {
     period_ns: i64,
     state: Option<Box<RavenState>>,
     features: [f32; FEATURES],
-    memory: Option<Memory>,
+    memory: Memory,
+    young: Memory,
+    /// How often it began anew, and when it does so next.
+    young_begun: usize,
+    young_until_ns: i64,
     state_ns: i64,
     start_ns: Option<i64>,
     next_ns: i64,
@@ -78,7 +84,10 @@ impl<'a> Pairing<'a> {
             period_ns: (1e9 / reading.truth_hz.max(1e-3)) as i64,
             state: None,
             features: [0.0; FEATURES],
-            memory: reading.memory.then(Memory::default),
+            memory: Memory::new(&reading.plays),
+            young: Memory::new(&reading.plays),
+            young_begun: 0,
+            young_until_ns: i64::MIN,
             state_ns: 0,
             start_ns: None,
             next_ns: i64::MIN,
@@ -90,9 +99,13 @@ impl<'a> Pairing<'a> {
         let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
         self.state_ns = stamp_ns;
         features::extract(&state, self.side.index(), &mut self.features);
-        if let Some(memory) = &mut self.memory {
-            memory.follow(&self.features);
+        self.memory.follow(&self.features);
+        if stamp_ns >= self.young_until_ns {
+            self.young.forget();
+            self.young_until_ns = stamp_ns + (YOUNG_S[self.young_begun % YOUNG_S.len()] * 1e9) as i64;
+            self.young_begun += 1;
         }
+        self.young.follow(&self.features);
         self.state = Some(state);
     }
 
@@ -125,9 +138,12 @@ impl<'a> Pairing<'a> {
         self.next_ns = (self.next_ns + self.period_ns).max(truth.time_ns + self.period_ns / 2);
         self.found.time_s.push(time_s);
         self.found.inputs.extend_from_slice(&inputs);
-        if let Some(memory) = &self.memory {
-            self.found.inputs.extend_from_slice(&memory.places(&inputs));
-        }
+        let mut places = vec![0.0; self.memory.len()];
+        self.memory.places(&inputs, &mut places);
+        self.found.inputs.extend_from_slice(&places);
+        self.young.places(&inputs, &mut places);
+        self.found.young_places.extend_from_slice(&places);
+        self.found.is_unsettled.push(!self.young.is_settled());
         self.found.labels.extend(label.map(|part| part as f32));
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! How often the bound that the card states holds, and how often its domain is left: computed as the service does.
 
-use super::{Rest, Trust};
+use super::{Rest, Trust, Unsettled};
 use crate::commands::Model;
 use crate::data::Trajectory;
 
@@ -39,7 +39,25 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
     leaving.sort_by(|a, b| b.1.total_cmp(&a.1));
     leaving.truncate(LEAVING);
     trust.leaving = leaving;
+    trust.unsettled = unsettled(model, test, numbers("ravenpose.bound95_unsettled_mm"));
     trust
+}
+
+fn unsettled(model: &Model, test: &[Trajectory], bound95: Vec<f64>) -> Option<Unsettled> {
+    let outputs = model.chain.outputs().max(1);
+    let (mut squares, mut rows, mut inside) = (0.0_f64, 0_usize, 0_usize);
+    for one in test.iter().map(Trajectory::unsettled) {
+        let estimate = model.chain.estimate(&one.inputs);
+        rows += one.rows();
+        for (at, (truth, estimate)) in one.exact.iter().zip(&estimate).enumerate() {
+            let rest = f64::from((truth - estimate).abs());
+            squares += rest * rest;
+            inside += usize::from(bound95.get(at % outputs).is_some_and(|bound| rest <= *bound));
+        }
+    }
+    let n = rows.max(1) as f64;
+    let coverage = 100.0 * inside as f64 / (n * outputs as f64);
+    (rows > 0).then(|| Unsettled { rows, rms: (squares / n).sqrt(), bound95, coverage })
 }
 
 fn coverage(trust: &mut Trust, test: &[Trajectory], estimates: &[Rest]) {

@@ -76,6 +76,21 @@ pub struct Trust {
     pub out_of_domain: f64,
     /// Inputs that left their range most often, with the share of rows, percent.
     pub leaving: Vec<(String, f64)>,
+    /// The rows again with a memory that began a few seconds before and had not settled; none where the model has no memory.
+    pub unsettled: Option<Unsettled>,
+}
+
+/// What a model with a memory is good for soon after its start.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Unsettled {
+    /// Rows in which such a memory had not settled.
+    pub rows: usize,
+    /// RMS of the vector that is left of them, against the truth without added noise.
+    pub rms: f64,
+    /// Half widths that the card states for them.
+    pub bound95: Vec<f64>,
+    /// Share of those rows within the bound over all axes, percent.
+    pub coverage: f64,
 }
 
 /// The whole report.
@@ -134,7 +149,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
         truth_noise_mm: model.number("ravenpose.truth_noise_mm").unwrap_or(0.0),
-        memory: model.has_memory(),
+        plays: model.chain.plays.clone(),
         ..wish.reading.clone()
     };
     let set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
@@ -149,6 +164,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         return Err(TrainingError::Model { file: shown(wish.model), what });
     }
     let outputs = set.outputs();
+    let own_inputs = set.inputs() - model.chain.plays.len();
     let (train, test, known) = parts(&model, set.trajectories);
     if test.is_empty() {
         return Err(TrainingError::Unfit {
@@ -166,7 +182,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
     methods.push(judge.method("model", "this model file", &estimates, None, Some(estimate_us)));
     if wish.rivals && !train.is_empty() {
         // Rivals see the 118 features alone: the memory is the model's.
-        for (name, what, mut rival) in rivals::all(set.is_raven, set.input_names.len(), wish.seed) {
+        for (name, what, mut rival) in rivals::all(set.is_raven, own_inputs, wish.seed) {
             told(name);
             let begun = Instant::now();
             rival.fit(&train, outputs);

@@ -124,6 +124,15 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
             trust.out_of_range, trust.out_of_domain
         ),
     ];
+    if let Some(unsettled) = &trust.unsettled {
+        lines.push(format!(
+            "With a memory that began 0 to 8 s before and has not settled ({} rows): {:.3} {unit} RMS left; half widths {} hold in {:.1} %.",
+            unsettled.rows,
+            unsettled.rms,
+            list(&unsettled.bound95, 3),
+            unsettled.coverage
+        ));
+    }
     if !trust.leaving.is_empty() {
         let names: Vec<String> = trust.leaving.iter().map(|(name, share)| format!("{name} ({share:.2} %)")).collect();
         lines.push(format!("Inputs that leave their range most often: {}.", names.join(", ")));

@@ -1,5 +1,6 @@
 //! ONNX out and in: a chain of dense layers with its card as metadata. Operator set 17, IR 8, which every runtime since 2022 reads.
 
+mod memory;
 mod proto;
 
 use crate::chain::{Chain, Dense};
@@ -22,7 +23,7 @@ const ACTIVATIONS: [Activation; 4] = [Activation::Sigmoid, Activation::Tanh, Act
 /// The bytes of an ONNX file; properties in the order of their keys, so that the same model gives the same bytes.
 pub fn write(chain: &Chain, metadata: &BTreeMap<String, String>) -> Vec<u8> {
     let mut graph = Graph { name: "ravenpose".to_owned(), ..Graph::default() };
-    let mut current = INPUT.to_owned();
+    let mut current = if chain.plays.is_empty() { INPUT.to_owned() } else { memory::write(&mut graph, &chain.plays) };
     for (operator, name, values) in [("Sub", "shift", &chain.shift), ("Mul", "scale", &chain.scale)] {
         graph.initializer.push(tensor(name, &[values.len()], values.iter()));
         let out = format!("{name}.out");
@@ -45,8 +46,8 @@ pub fn write(chain: &Chain, metadata: &BTreeMap<String, String>) -> Vec<u8> {
             current = out;
         }
     }
-    graph.input.push(value(INPUT, chain.inputs()));
-    graph.output.push(value(OUTPUT, chain.outputs()));
+    graph.input.insert(0, value(INPUT, FLOAT, chain.inputs() - chain.plays.len()));
+    graph.output.insert(0, value(OUTPUT, FLOAT, chain.outputs()));
     let model = Model {
         ir_version: IR_VERSION,
         producer_name: "ravenpose".to_owned(),
@@ -72,9 +73,9 @@ fn tensor<'a>(name: &str, shape: &[usize], values: impl Iterator<Item = &'a f32>
     }
 }
 
-fn value(name: &str, width: usize) -> ValueInfo {
+fn value(name: &str, element: i32, width: usize) -> ValueInfo {
     let dim = vec![Dimension { value: 1 }, Dimension { value: width as i64 }];
-    let tensor = Some(TensorType { element: FLOAT, shape: Some(Shape { dim }) });
+    let tensor = Some(TensorType { element, shape: Some(Shape { dim }) });
     ValueInfo { name: name.to_owned(), kind: Some(Type { tensor }) }
 }
 
@@ -86,7 +87,8 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
     let model = Model::decode(bytes).map_err(|error| format!("is no ONNX file: {error}"))?;
     let graph = model.graph.ok_or("has no graph")?;
     let tensors: BTreeMap<&str, &Tensor> = graph.initializer.iter().map(|one| (one.name.as_str(), one)).collect();
-    let mut nodes = graph.node.iter().peekable();
+    let plays = memory::read(&graph)?;
+    let mut nodes = graph.node.iter().skip(if plays.is_empty() { 0 } else { memory::NODES }).peekable();
     let mut next = |operator: &str| nodes.next_if(|node| node.op_type == operator);
     let vector = |node: Option<&Node>, at: usize| -> Result<Vec<f32>, String> {
         let name = node.and_then(|node| node.input.get(at)).ok_or("is not a chain that ravenpose wrote")?;
@@ -108,7 +110,7 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
         return Err("is not a chain that ravenpose wrote".to_owned());
     }
     let metadata = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
-    Ok((Chain { shift, scale, layers }, metadata))
+    Ok((Chain { shift, scale, layers, plays }, metadata))
 }
 
 fn floats(tensor: &Tensor) -> Result<Vec<f32>, String> {
@@ -123,6 +125,7 @@ fn floats(tensor: &Tensor) -> Result<Vec<f32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ravenpose::memory::Play;
 
     fn chain() -> Chain {
         let layer = |rows: usize, columns: usize, activation| Dense {
@@ -131,29 +134,38 @@ mod tests {
             activation,
         };
         let layers = vec![layer(5, 4, Activation::Tanh), layer(6, 5, Activation::Elu), layer(3, 6, Activation::Identity)];
-        Chain { shift: vec![1.0; 4], scale: vec![0.5; 4], layers }
+        Chain { shift: vec![1.0; 4], scale: vec![0.5; 4], layers, plays: Vec::new() }
+    }
+
+    /// The same with a memory: two of its four inputs are places.
+    fn with_memory() -> Chain {
+        Chain { plays: vec![Play { input: 0, half_width: 0.25 }, Play { input: 1, half_width: 3.0 }], ..chain() }
     }
 
     #[test]
     fn what_was_written_reads_as_the_same_chain() {
         let metadata = BTreeMap::from([("ravenpose.units".to_owned(), "mm".to_owned())]);
-        let bytes = write(&chain(), &metadata);
-        assert_eq!(read(&bytes), Ok((chain(), metadata.clone())));
-        assert_eq!(bytes, write(&chain(), &metadata));
+        for chain in [chain(), with_memory()] {
+            let bytes = write(&chain, &metadata);
+            assert_eq!(read(&bytes), Ok((chain.clone(), metadata.clone())));
+            assert_eq!(bytes, write(&chain, &metadata));
+        }
     }
 
     #[test]
     fn a_damaged_file_is_refused_without_a_panic() {
-        let bytes = write(&chain(), &BTreeMap::new());
-        for length in 0..bytes.len() {
-            if let Ok((found, _)) = read(&bytes[..length]) {
-                assert_eq!(found, chain(), "{length}");
+        for chain in [chain(), with_memory()] {
+            let bytes = write(&chain, &BTreeMap::new());
+            for length in 0..bytes.len() {
+                if let Ok((found, _)) = read(&bytes[..length]) {
+                    assert_eq!(found, chain, "{length}");
+                }
             }
-        }
-        for at in 0..bytes.len() {
-            let mut other = bytes.clone();
-            other[at] ^= 0x55;
-            let _ = read(&other);
+            for at in 0..bytes.len() {
+                let mut other = bytes.clone();
+                other[at] ^= 0x55;
+                let _ = read(&other);
+            }
         }
     }
 }

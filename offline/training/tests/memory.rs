@@ -1,0 +1,79 @@
+//! What training takes for the memory, and what the service makes of the written file, are the same.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{Folder, plays, runs, small};
+use ravenpose::config::ModelSource;
+use ravenpose::cycle::Estimator;
+use ravenpose::network::Format;
+use ravenpose_wire::{FEATURES, features};
+use recordings::open::{Opened, open};
+use recordings::stream::Record;
+use training::commands::{self, Model, Wish};
+use training::data::{self, Reading};
+
+#[test]
+fn the_service_gives_for_a_run_what_training_says_of_it() {
+    let folder = Folder::new("service");
+    let files = runs(&folder, 3, 4.0, ".mcap");
+    let (out, recipe) = (folder.file("model.onnx"), small("default"));
+    let reading = Reading { plays: plays(&recipe), truth_hz: 1000.0, ..Reading::default() };
+    commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
+    let set = data::read(&files[..1], &reading, &mut |_, _| {}).expect("run");
+    let expected = Model::read(&out).expect("model").chain.estimate(&set.trajectories[0].inputs);
+    // Weights as they are, so that what is left is the order of the sums.
+    let source = ModelSource { weights: Some(Format::F32), ..ModelSource::new(out) };
+    let mut model = ravenpose::model::load(&source).expect("the service takes it").model;
+    assert!(model.estimator.remembers() && !model.estimator.is_settled());
+    let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
+    let (mut found, mut row) = (Vec::new(), [0.0_f32; FEATURES]);
+    while let Some(record) = source.next().expect("record") {
+        match record {
+            Record::State(state) => {
+                features::extract(&state, 0, &mut row);
+                model.estimator.follow(&row);
+            }
+            Record::Truth(_) => {
+                let mut error_mm = [0.0; 3];
+                model.estimator.run(&row, &mut error_mm);
+                found.extend(error_mm);
+            }
+        }
+    }
+    assert_eq!(found.len(), expected.len());
+    let worst = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst < 1e-4, "{worst} mm");
+    // And the memory matters: without it the answers are others.
+    model.estimator.forget();
+    model.estimator.follow(&row);
+    let mut alone = [0.0; 3];
+    model.estimator.run(&row, &mut alone);
+    let last = &expected[expected.len() - 3..];
+    assert!(alone.iter().zip(last).any(|(a, b)| (a - b).abs() > 1e-3), "{alone:?} {last:?}");
+}
+
+#[test]
+fn rows_with_a_young_memory_are_those_of_a_run_that_began_then() {
+    let folder = Folder::new("young");
+    let files = runs(&folder, 1, 6.0, ".mcap");
+    let reading = Reading { plays: plays(&small("default")), truth_hz: 1000.0, ..Reading::default() };
+    let one = &data::read(&files, &reading, &mut |_, _| {}).expect("run").trajectories[0];
+    let unsettled = one.unsettled();
+    assert!(unsettled.rows() > 500 && unsettled.rows() <= one.rows(), "{} of {}", unsettled.rows(), one.rows());
+    // The second memory began after a second and again after three: its first row then knows nothing.
+    let places = one.young_places.len() / one.rows();
+    let is_new = |row: usize| one.young_places[row * places..(row + 1) * places].iter().all(|place| *place == 0.0);
+    let begun = (1..one.rows()).filter(|row| is_new(*row) && !is_new(row - 1)).map(|row| one.time_s[row]);
+    // In the first moments the robot stands still, which looks the same.
+    let begun: Vec<f64> = begun.filter(|time| *time > 0.5).collect();
+    assert_eq!(begun.iter().map(|time| time.round() as i64).collect::<Vec<_>>(), [1, 3], "{begun:?}");
+    let mut young = one.clone();
+    young.make_young(8);
+    let width = one.inputs.len() / one.rows();
+    for row in 0..one.rows() {
+        let expected = if row % 8 == 0 { &one.young_places } else { &one.inputs[FEATURES..] };
+        let at = if row % 8 == 0 { row * places } else { row * width };
+        assert_eq!(young.inputs[row * width + FEATURES..(row + 1) * width], expected[at..at + places], "{row}");
+    }
+}

@@ -1,0 +1,187 @@
+//! What an estimator with a memory is told to follow and to forget, and what the pose says meanwhile.
+
+use crate::world::{MS, state};
+use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::guard::{Domain, Guard};
+use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
+
+/// States after which it is settled.
+const SETTLES_AFTER: u32 = 300;
+/// Feature of the first joint, and the most that the model has seen of it, degrees.
+const JPOS: usize = 56;
+const JPOS_MAX: f32 = 50.0;
+
+/// Answers with the number of states that it followed since it forgot, in µm, on the z axis.
+#[derive(Default)]
+struct Counts {
+    followed: u32,
+}
+
+impl Estimator for Counts {
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn follow(&mut self, _features: &[f32; FEATURES]) {
+        self.followed += 1;
+    }
+
+    fn forget(&mut self) {
+        self.followed = 0;
+    }
+
+    fn is_settled(&self) -> bool {
+        self.followed >= SETTLES_AFTER
+    }
+
+    fn run(&mut self, _features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+        *error_mm = [0.0, 0.0, self.followed as f32 * 1e-3];
+    }
+}
+
+/// Anything, but for the first joint.
+fn domain() -> Domain {
+    let (mut min, mut max) = ([f32::MIN; FEATURES], [f32::MAX; FEATURES]);
+    (min[JPOS], max[JPOS]) = (0.0, JPOS_MAX);
+    Domain { min, max, center: [0.0; FEATURES], weight: [0.0; FEATURES], limit: 1.0 }
+}
+
+struct Bench {
+    cycle: Cycle<Counts>,
+    pose: CorrectedPose,
+    step: u64,
+    now: i64,
+    source: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let model = |connected: bool| {
+            let model = Model {
+                estimator: Counts::default(),
+                guard: Guard::new(Some(domain())),
+                id: 1,
+                bound_um: 8_000.0,
+                bound95_um: [300.0, 400.0, 500.0],
+                bound95_unsettled_um: [800.0, 900.0, 1000.0],
+                untrained: false,
+            };
+            if connected { ArmModel::Loaded(Box::new(model)) } else { ArmModel::None }
+        };
+        // Fast enough that a correction is the estimator's own answer.
+        let limits = Limits { recover_um: 1e6, rate_um: 1e6, ..Limits::default() };
+        let cycle = Cycle::new(limits, [model(true), model(false)], false, 0);
+        Self { cycle, pose: CorrectedPose::new(), step: 0, now: 1_000 * MS, source: 7 }
+    }
+
+    fn next_state(&mut self) -> RavenState {
+        self.now += MS;
+        self.step += 1;
+        state(self.source, self.step, self.step, self.now)
+    }
+
+    fn offer(&mut self, state: &RavenState) {
+        self.cycle.offer(state, self.now);
+    }
+
+    fn answer(&mut self) -> CorrectedPose {
+        assert!(self.cycle.step(self.now, &mut (), &mut self.pose));
+        self.cycle.finish(self.now + 40_000, false, &mut self.pose);
+        self.pose
+    }
+
+    fn good(&mut self) -> CorrectedPose {
+        let state = self.next_state();
+        self.offer(&state);
+        self.answer()
+    }
+
+    /// Good cycles until the correction is back; how many states the estimator has followed then.
+    fn followed(&mut self) -> u32 {
+        for _ in 0..2000 {
+            let pose = self.good();
+            if pose.arm[0].status == ArmStatus::Valid as u32 {
+                return pose.arm[0].correction_um[2].round() as u32;
+            }
+        }
+        panic!("never valid: {:?}", self.pose.arm[0]);
+    }
+}
+
+#[test]
+fn every_state_of_a_good_run_is_followed_those_before_the_first_correction_too() {
+    assert_eq!(Bench::new().followed(), 101);
+}
+
+#[test]
+fn states_that_newer_ones_overtake_are_followed() {
+    let mut bench = Bench::new();
+    let before = bench.followed();
+    for _ in 0..5 {
+        let state = bench.next_state();
+        bench.offer(&state);
+    }
+    let pose = bench.answer();
+    assert_eq!((pose.skipped, pose.arm[0].correction_um[2].round() as u32), (4, before + 5));
+}
+
+#[test]
+fn a_state_that_no_robot_can_have_is_not_followed_and_one_outside_the_training_is() {
+    let mut bench = Bench::new();
+    let mut before = bench.followed();
+    for (jpos, reason, bad) in
+        [(f32::NAN, flag::INPUT_NOT_FINITE, 0), (170.0, flag::INPUT_IMPOSSIBLE, 0), (JPOS_MAX + 1.0, flag::OUT_OF_RANGE, 1)]
+    {
+        let mut state = bench.next_state();
+        state.jpos[0] = jpos;
+        state.seal(bench.step);
+        bench.offer(&state);
+        let arm = bench.answer().arm[0];
+        assert_eq!((arm.status, arm.flags & reason), (ArmStatus::Fallback as u32, reason));
+        // A hundred good ones before the correction returns, and the one that it returns with.
+        let after = bench.followed();
+        assert_eq!(after, before + bad + 101, "{jpos}");
+        before = after;
+    }
+}
+
+#[test]
+fn a_short_gap_keeps_the_memory_and_a_long_one_ends_it() {
+    for (periods, kept) in [(19, true), (21, false)] {
+        let mut bench = Bench::new();
+        let before = bench.followed();
+        bench.step += periods - 1;
+        bench.now += (periods as i64 - 1) * MS;
+        let found = bench.followed();
+        // Nothing was answered as stale in between, so the correction goes on at once.
+        assert_eq!(found, if kept { before + 1 } else { 1 }, "{periods}");
+    }
+}
+
+#[test]
+fn another_source_and_a_disconnection_end_it() {
+    let mut bench = Bench::new();
+    let _ = bench.followed();
+    bench.source = 8;
+    // The first of the new source is followed, though it is answered with the raw pose.
+    assert_eq!(bench.followed(), 102);
+    let mut state = bench.next_state();
+    state.arms = 2;
+    state.seal(bench.step);
+    bench.offer(&state);
+    assert_eq!(bench.answer().arm[0].status, ArmStatus::Absent as u32);
+    assert_eq!(bench.followed(), 101);
+}
+
+#[test]
+fn until_it_is_settled_the_pose_says_so_with_a_bound_of_its_own() {
+    let mut bench = Bench::new();
+    let _ = bench.followed();
+    for followed in 102..SETTLES_AFTER {
+        let arm = bench.good().arm[0];
+        assert_eq!((arm.status, arm.flags), (ArmStatus::Valid as u32, flag::MEMORY_UNSETTLED), "{followed}");
+        assert_eq!(arm.bound95_um, [800.0, 900.0, 1000.0]);
+    }
+    let arm = bench.good().arm[0];
+    assert_eq!((arm.flags, arm.bound95_um), (0, [300.0, 400.0, 500.0]));
+}
