@@ -16,6 +16,7 @@ mod plot;
 mod progress;
 mod prove;
 mod record;
+mod registration;
 mod simulate;
 mod stats;
 mod train;
@@ -87,9 +88,16 @@ enum Command {
         /// Recording with the true tip (vision's truth.csv); without it the truth is in RUN
         #[arg(long)]
         truth: Option<PathBuf>,
-        /// Table of pairs to write; the report goes beside it as .report.json
+        /// Table of pairs to write (.csv), or the whole recording with the truth in frame 0 inside, for `train` (.mcap, .bag, .252.csv,
+        /// .parquet); the report goes beside it as .report.json
         #[arg(long)]
         out: PathBuf,
+        /// The cameras' frame is known: [registration] of this cameras.toml
+        #[arg(long, value_name = "cameras.toml", conflicts_with_all = ["same", "register"])]
+        cameras: Option<PathBuf>,
+        /// Write the frame that fits this run into this cameras.toml, as [registration]
+        #[arg(long, value_name = "cameras.toml", conflicts_with = "same")]
+        register: Option<PathBuf>,
         /// The truth is on the states' clock and in frame 0 already
         #[arg(long, conflicts_with = "offset_s")]
         same: bool,
@@ -225,7 +233,15 @@ fn main() -> ExitCode {
         Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
-        Command::Pair { run, truth, out, same, offset_s } => pair::run(&run, truth.as_deref(), &out, same, offset_s),
+        Command::Pair { run, truth, out, cameras, register, same, offset_s } => pair::run(&pair::Wish {
+            run: &run,
+            truth: truth.as_deref(),
+            out: &out,
+            cameras: cameras.as_deref(),
+            register: register.as_deref(),
+            same,
+            offset_s,
+        }),
         Command::Gap { real, sim, robot, out, seed, trace, watch } => {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch })
         }

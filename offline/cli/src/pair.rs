@@ -1,23 +1,60 @@
-//! `ravenpose pair`: reported and true tip positions of the same moments, with the clock and the frame between them.
+//! `ravenpose pair`: reported and true tip positions of the same moments, with the clock and the frame between them; as a table, or as the
+//! recording with its truth inside, which `ravenpose train` learns from.
 
-use crate::{output, plot};
+use crate::convert::same_file;
+use crate::{output, plot, registration};
+use arm::Side;
 use recordings::Recording;
-use recordings::pairs::{ClockChoice, Options, Reported, Truth, pair, stated_offset_s};
+use recordings::open::{Opened, open};
+use recordings::pairs::{ClockChoice, Options, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
+use recordings::save::{self, StateFormat};
+use recordings::stream::{self, Record};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// `same`: the truth is on the states' clock and in frame 0 of the arm (a simulation, an earlier registration). `offset_s`: what is
-/// known of the clocks' offset; otherwise the two recordings' own start times, otherwise that they begin together.
-pub(crate) fn run(run: &Path, truth: Option<&Path>, out: &Path, same: bool, offset_s: Option<f64>) -> Result<ExitCode, String> {
+/// What is to be paired.
+pub(crate) struct Wish<'a> {
+    /// Recording with the reported tip.
+    pub(crate) run: &'a Path,
+    /// The true tip, where it is in a file of its own.
+    pub(crate) truth: Option<&'a Path>,
+    /// A table of pairs, or a recording with the truth inside.
+    pub(crate) out: &'a Path,
+    /// cameras.toml whose `[registration]` is the frame.
+    pub(crate) cameras: Option<&'a Path>,
+    /// cameras.toml that the fitted frame is written to.
+    pub(crate) register: Option<&'a Path>,
+    /// The truth is on the states' clock and in frame 0 of the arm (a simulation).
+    pub(crate) same: bool,
+    /// What is known of the clocks' offset; otherwise the two recordings' own start times, otherwise that they begin together.
+    pub(crate) offset_s: Option<f64>,
+}
+
+pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
+    let (run, out, offset_s) = (wish.run, wish.out, wish.offset_s);
     if offset_s.is_some_and(|offset_s| !offset_s.is_finite()) {
         return Err("--offset-s: must be a number of seconds".to_owned());
     }
+    let format = StateFormat::of_name(out);
+    if let Some(format @ (StateFormat::StateFile | StateFormat::Columns235)) = format {
+        return Err(format!(
+            "{}: {format:?} holds no truth; name the output .csv, .mcap, .bag, .252.csv or .parquet",
+            out.display()
+        ));
+    }
+    if [run].into_iter().chain(wish.truth).any(|input| same_file(input, out)) {
+        return Err(format!("{}: is both input and output; choose another output", out.display()));
+    }
+    let known = wish.cameras.map(registration::read).transpose()?;
     let recording = plot::read(run)?;
-    let separate = truth.map(plot::read).transpose()?;
+    let separate = wish.truth.map(plot::read).transpose()?;
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
     let frames = Truth::from_recording(separate.as_ref().unwrap_or(&recording)).map_err(|error| error.to_string())?;
-    let mut options = if same { Options::same_clock_and_frame() } else { Options::default() };
+    let mut options = if wish.same { Options::same_clock_and_frame() } else { Options::default() };
+    if let Some(known) = known {
+        options.registration = RegistrationChoice::Known(known);
+    }
     if let ClockChoice::Fit { expected_offset_s, window_s, .. } = &mut options.clock {
         let stated = || separate.as_ref().and_then(|truth| stated_offset_s(&recording, truth));
         if let Some(found) = offset_s.or_else(stated) {
@@ -27,13 +64,59 @@ pub(crate) fn run(run: &Path, truth: Option<&Path>, out: &Path, same: bool, offs
         }
     }
     let paired = pair(&reported, &frames, &options).map_err(|error| format!("{}: {error}", run.display()))?;
-    let text = table(&paired, &recording);
-    output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+    if let Some(format) = format {
+        recording_with_truth(run, &paired, out, format)?;
+    } else {
+        let text = table(&paired, &recording);
+        output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+    }
     let report = out.with_extension("report.json");
     output::whole(&report, |file| file.write_all(paired.report.to_json().as_bytes()).map_err(|error| error.to_string()))?;
     output::say(format_args!("{}", paired.report));
     say!("{}: {} pairs; {}: the report", out.display(), paired.pairs.len(), report.display());
+    if let Some(cameras) = wish.register {
+        let name = run.file_name().unwrap_or_default().to_string_lossy();
+        registration::write(cameras, &paired.report.registration, &name)?;
+        say!("{}: [registration] is that of this run; a constant error of the arm is in it", cameras.display());
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that
+/// the recording held for that arm is left out.
+fn recording_with_truth(run: &Path, paired: &recordings::pairs::Paired, out: &Path, format: StateFormat) -> Result<(), String> {
+    let Opened::States(mut source) = open(run).map_err(|error| error.to_string())? else {
+        let remedy = "name the output .csv for the table of pairs, or convert the run to .mcap first";
+        return Err(format!(
+            "{}: is a table, not a recording of states: {} cannot be made of it; {remedy}",
+            run.display(),
+            out.display()
+        ));
+    };
+    let metadata = source.metadata().to_vec();
+    let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
+    let mut pairs = paired.pairs.iter().peekable();
+    let mut start_ns = None;
+    let mut side = Side::Gold;
+    while let Some(record) = source.next().map_err(|error| error.to_string())? {
+        let time_ns = record.time_ns();
+        match &record {
+            Record::State(state) => {
+                let start_ns = *start_ns.get_or_insert(time_ns);
+                side = if state.connected() == 2 { Side::Green } else { Side::Gold };
+                let at_ns = |time_s: f64| start_ns + (time_s * 1e9).round() as i64;
+                while let Some(pair) = pairs.next_if(|pair| at_ns(pair.state_time_s) < time_ns) {
+                    let truth =
+                        stream::Truth { position_m: pair.truth_m, ..stream::Truth::unknown(at_ns(pair.state_time_s), side) };
+                    sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
+                }
+            }
+            Record::Truth(truth) if truth.side == side => continue,
+            Record::Truth(_) => {}
+        }
+        sink.write(&record).map_err(|error| error.to_string())?;
+    }
+    sink.finish().map_err(|error| error.to_string())
 }
 
 /// One row per pair: times on both clocks, reported and true position and the label, mm, frame 0.

@@ -4,8 +4,10 @@
 use ravenpose::config::ModelSource;
 use ravenpose::cycle::Estimator;
 use ravenpose::model;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use training::data::{self, Reading};
 
 fn ravenpose(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ravenpose")).args(arguments).output().expect("ravenpose runs")
@@ -95,6 +97,100 @@ fn runs_after_one_homing_have_its_offset_and_different_motions() {
     assert_eq!(offsets.len(), 1, "{summary}");
     let length = |run: usize| std::fs::metadata(folder.file("runs").join(format!("run_{run:04}.mcap"))).expect("run").len();
     assert_ne!(length(1), length(2));
+}
+
+/// The cameras' world against frame 0: x0 = -y + 0.1, y0 = x - 0.2, z0 = z + 0.3 (m).
+const REGISTRATION: &str =
+    "[registration]\nrotation = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]\ntranslation_mm = [100.0, -200.0, 300.0]\n";
+const CAMERAS: &str = "# as calibrated\nresolution = [640, 480]\n";
+
+/// What `ravenpose vision track` would have written of a run: 15 frames/s in the cameras' world, on a clock of its own.
+fn seen_by_cameras(run: &str, folder: &Folder) -> PathBuf {
+    let (table, out) = (folder.file("run.csv"), folder.file("truth.csv"));
+    good(&ravenpose(&["convert", run, text(&table)]));
+    let table = std::fs::read_to_string(table).expect("table");
+    let mut lines = table.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().expect("header").split(',').collect();
+    let at = ["t_s", "truth_x_mm", "truth_y_mm", "truth_z_mm"]
+        .map(|name| header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("{name} in {header:?}")));
+    let mut frames = String::from("frame,t_s,x_mm,y_mm,z_mm,status\n");
+    for (row, line) in lines.enumerate().filter(|(row, _)| row % 66 == 0) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [t_s, x, y, z] = at.map(|column| cells[column].parse::<f64>().unwrap_or(f64::NAN));
+        if row >= 660 && x.is_finite() {
+            let _ = writeln!(frames, "{},{:.6},{},{},{},ok", row / 66, t_s - 0.4, y + 200.0, 100.0 - x, z - 300.0);
+        }
+    }
+    std::fs::write(&out, frames).expect("truth");
+    out
+}
+
+#[test]
+fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
+    let folder = Folder::new("cameras");
+    let out = folder.file("runs");
+    let plan = ["--minutes", "2.4", "--run-minutes", "0.6", "--seed", "3", "--homing-seed", "4"];
+    good(&ravenpose(&[&["simulate", "--robot", "raven2-worn", "--out", text(&out)], &plan[..]].concat()));
+    let runs: Vec<PathBuf> = (1..=4).map(|run| out.join(format!("run_{run:04}.mcap"))).collect();
+    let (cameras, known) = (folder.file("cameras.toml"), folder.file("known.toml"));
+    std::fs::write(&cameras, CAMERAS).expect("cameras");
+    std::fs::write(&known, format!("{CAMERAS}{REGISTRATION}")).expect("cameras");
+
+    // Registered to the run itself: near the true frame, with what the worn arm is off by on the whole.
+    let truth = seen_by_cameras(text(&runs[0]), &folder);
+    let pairs = folder.file("pairs.csv");
+    let line = ravenpose(&["pair", text(&runs[0]), "--truth", text(&truth), "--cameras", text(&cameras), "--out", text(&pairs)]);
+    assert!(String::from_utf8_lossy(&line.stderr).contains("has no [registration]") && !pairs.exists());
+    good(&ravenpose(&["pair", text(&runs[0]), "--truth", text(&truth), "--register", text(&cameras), "--out", text(&pairs)]));
+    let written = std::fs::read_to_string(&cameras).expect("cameras");
+    assert!(written.starts_with(CAMERAS) && written.contains("from = \"run_0001.mcap\""), "{written}");
+    let table: toml::Table = written.parse().expect("TOML");
+    let rotation = &table["registration"]["rotation"];
+    assert!((rotation[0][1].as_float().expect("number") + 1.0).abs() < 0.01, "{written}");
+
+    // With the frame known the recordings hold the whole error, as if the truth had been in them.
+    let mut seen = Vec::new();
+    for (index, run) in runs.iter().enumerate() {
+        let truth = seen_by_cameras(text(run), &folder);
+        let file = folder.file(&format!("seen_{index}.mcap"));
+        good(&ravenpose(&["pair", text(run), "--truth", text(&truth), "--cameras", text(&known), "--out", text(&file)]));
+        seen.push(file);
+    }
+    let labels = |files: &[PathBuf]| {
+        let reading = Reading { truth_hz: 14.0, ..Reading::default() };
+        let set = data::read(files, &reading, &mut |_, _| {}).expect("runs");
+        let squares: f64 = set.trajectories.iter().flat_map(|one| &one.exact).map(|mm| f64::from(*mm).powi(2)).sum();
+        (set.rows(), (squares / set.rows() as f64).sqrt())
+    };
+    let ((rows, found), (_, expected)) = (labels(&seen), labels(&runs));
+    assert!(rows > 300 && expected > 1.0, "{rows} {expected}");
+    // But for frames at standstill, which are left out, and for what of a lag the fitted clock takes.
+    assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
+    let (model, seen) = (folder.file("model.onnx"), seen.iter().map(|file| text(file)).collect::<Vec<_>>());
+    good(&ravenpose(&[&["train", "--epochs", "2", "--out", text(&model), "--data"][..], &seen].concat()));
+
+    // What cannot be written is one line, and nothing is left.
+    let table = folder.file("run.csv");
+    for (input, output, words) in [
+        (&table, "made.mcap", "is a table, not a recording of states"),
+        (&runs[3], "made.rvs", "holds no truth"),
+        (&runs[3], "runs/run_0004.mcap", "both input and output"),
+    ] {
+        let refused = ravenpose(&[
+            "pair",
+            text(input),
+            "--truth",
+            text(&truth),
+            "--cameras",
+            text(&known),
+            "--out",
+            text(&folder.file(output)),
+        ]);
+        let error = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!((refused.status.code(), error.lines().count()), (Some(2), 1), "{error}");
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(!folder.file("made.mcap").exists());
 }
 
 #[test]
