@@ -17,6 +17,7 @@ mod progress;
 mod prove;
 mod record;
 mod registration;
+mod search;
 mod simulate;
 mod stats;
 mod train;
@@ -193,6 +194,8 @@ enum Command {
     },
     /// Learn where the arm really is from recordings with truth: a model file with card, hash and curves
     Train(train::Wish),
+    /// Try random recipes for `train`, the better ones longer: a hundred trainings in one command, which may be stopped
+    Search(search::Wish),
     /// What a model leaves on runs that it has not seen, rivals beside it: report.json and report.html
     Evaluate(evaluate::Wish),
     /// Latency histograms and counters of the running service
@@ -264,6 +267,7 @@ fn main() -> ExitCode {
         }
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
         Command::Train(wish) => train::run(&wish),
+        Command::Search(wish) => search::run(&wish),
         Command::Evaluate(wish) => evaluate::run(&wish),
         Command::Vision(wish) => vision::run(&wish),
         Command::Check { core, priority, spin, seconds } => check::run(core, priority, spin, seconds),

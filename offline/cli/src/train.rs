@@ -6,27 +6,37 @@ use ::training::data::{Columns, Reading, memory};
 use ::training::preset::Recipe;
 use clap::Args;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// What to learn from, and how.
 #[derive(Args)]
 pub(crate) struct Wish {
-    /// Recordings with truth, one whole trajectory each
-    #[arg(long, required = true, num_args = 1..)]
-    data: Vec<PathBuf>,
+    #[command(flatten)]
+    source: Source,
     /// ONNX file to write; FILE.sha256 and FILE.curves.svg go beside it
     #[arg(long)]
     out: PathBuf,
     /// Recipe
     #[arg(long, default_value = "default", value_parser = ["default", "one-state", "paper", "paper-code"])]
     preset: String,
+    /// Recipe in a file: best.json of `ravenpose search`
+    #[arg(long, conflicts_with = "preset", value_name = "FILE")]
+    recipe: Option<PathBuf>,
     /// Everything random: split, weights, order of rows
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Passes over the training rows, instead of the preset's
     #[arg(long)]
     epochs: Option<usize>,
+}
+
+/// Recordings, and how they are read.
+#[derive(Args)]
+pub(crate) struct Source {
+    /// Recordings with truth, one whole trajectory each
+    #[arg(long, required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
     /// At most so many rows per second of truth
     #[arg(long, default_value_t = 30.0)]
     truth_hz: f64,
@@ -38,6 +48,33 @@ pub(crate) struct Wish {
     arm: String,
     #[command(flatten)]
     columns: Named,
+}
+
+impl Source {
+    /// Is it a table with named columns, not a RAVEN-II's states?
+    pub(crate) fn is_table(&self) -> bool {
+        self.columns.columns().is_some()
+    }
+
+    pub(crate) fn reading(&self, recipe: &Recipe) -> Result<Reading, String> {
+        if !(self.truth_hz > 0.0 && self.truth_hz <= 1000.0) {
+            return Err(format!("--truth-hz {}: must be above 0 and at most 1000; write --truth-hz 30", self.truth_hz));
+        }
+        if !(0.0..=100.0).contains(&self.truth_noise) {
+            return Err(format!("--truth-noise {}: must be from 0 to 100 mm; write --truth-noise 0.5", self.truth_noise));
+        }
+        if let Some(width) = self.columns.plays.iter().find(|width| !(width.is_finite() && **width > 0.0)) {
+            return Err(format!("--plays {width}: half widths are numbers above 0"));
+        }
+        Ok(Reading {
+            truth_hz: self.truth_hz,
+            truth_noise_mm: self.truth_noise,
+            seed: recipe.seed,
+            plays: if recipe.memory { memory::plays() } else { Vec::new() },
+            arm: usize::from(self.arm == "green"),
+            columns: self.columns.columns(),
+        })
+    }
 }
 
 /// Columns of tables that are no RAVEN-II's states.
@@ -69,33 +106,19 @@ impl Named {
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
-    if !(wish.truth_hz > 0.0 && wish.truth_hz <= 1000.0) {
-        return Err(format!("--truth-hz {}: must be above 0 and at most 1000; write --truth-hz 30", wish.truth_hz));
-    }
-    if !(0.0..=100.0).contains(&wish.truth_noise) {
-        return Err(format!("--truth-noise {}: must be from 0 to 100 mm; write --truth-noise 0.5", wish.truth_noise));
-    }
-    let mut recipe = Recipe::preset(&wish.preset).ok_or_else(|| format!("--preset {}: no such recipe", wish.preset))?;
+    let mut recipe = match &wish.recipe {
+        None => Recipe::preset(&wish.preset).ok_or_else(|| format!("--preset {}: no such recipe", wish.preset))?,
+        Some(file) => recipe(file)?,
+    };
     recipe.seed = wish.seed;
     if let Some(epochs) = wish.epochs {
         recipe.epochs = epochs;
     }
-    let columns = wish.columns.columns();
-    if let Some(width) = wish.columns.plays.iter().find(|width| !(width.is_finite() && **width > 0.0)) {
-        return Err(format!("--plays {width}: half widths are numbers above 0"));
-    }
-    if columns.is_some() {
+    if wish.source.is_table() {
         recipe = recipe.for_tables();
     }
-    let reading = Reading {
-        truth_hz: wish.truth_hz,
-        truth_noise_mm: wish.truth_noise,
-        seed: wish.seed,
-        plays: if recipe.memory { memory::plays() } else { Vec::new() },
-        arm: usize::from(wish.arm == "green"),
-        columns,
-    };
-    let wanted = commands::Wish { data: &wish.data, reading: &reading, recipe: &recipe, out: &wish.out };
+    let reading = wish.source.reading(&recipe)?;
+    let wanted = commands::Wish { data: &wish.source.data, reading: &reading, recipe: &recipe, out: &wish.out };
     let terminal = std::io::stderr().is_terminal();
     let done = commands::train(&wanted, &mut |event| told(event, terminal)).map_err(|error| error.to_string())?;
     if terminal {
@@ -106,6 +129,18 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     }
     let _ = output::say(format_args!("{}", words(wish, &done)));
     Ok(ExitCode::SUCCESS)
+}
+
+fn recipe(file: &Path) -> Result<Recipe, String> {
+    let name = file.display();
+    let text = std::fs::read_to_string(file)
+        .map_err(|cause| format!("{name}: cannot be read: {cause}; give the best.json of `ravenpose search`"))?;
+    let recipe: Recipe = serde_json::from_str(&text)
+        .map_err(|error| format!("{name}: line {}: {error}; give the best.json of `ravenpose search`", error.line()))?;
+    if recipe.hidden.is_empty() || recipe.hidden.contains(&0) || recipe.batch == 0 || !(recipe.rate > 0.0) {
+        return Err(format!("{name}: hidden, batch and rate must be above 0"));
+    }
+    Ok(recipe)
 }
 
 /// On a terminal one line that changes; elsewhere a line for every tenth epoch.

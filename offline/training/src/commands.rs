@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// One row of training in so many has a memory that began a few seconds before.
-const YOUNG_EVERY: usize = 8;
+pub(crate) const YOUNG_EVERY: usize = 8;
 
 /// What is to be trained.
 #[derive(Debug, Clone)]
@@ -110,7 +110,7 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
 }
 
 /// The same run given twice would be in two sets.
-fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
+pub(crate) fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
     let mut seen = BTreeMap::new();
     for one in &set.trajectories {
         if let Some(other) = seen.insert(one.id(), &one.name) {

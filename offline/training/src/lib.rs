@@ -17,6 +17,7 @@ pub mod prepare;
 pub mod preset;
 pub mod random;
 pub mod rivals;
+pub mod search;
 pub mod split;
 pub mod train;
 

@@ -74,6 +74,21 @@ impl Trajectory {
         found
     }
 
+    /// Keeps one row in so many, the first of each.
+    pub fn thin(&mut self, every: usize) {
+        let rows = self.rows();
+        let (every, old) = (every.max(1), std::mem::take(&mut self.time_s));
+        let kept = || (0..rows).step_by(every);
+        self.time_s = kept().map(|row| old[row]).collect();
+        for numbers in [&mut self.inputs, &mut self.labels, &mut self.exact, &mut self.young_places] {
+            let width = numbers.len() / rows.max(1);
+            *numbers = kept().flat_map(|row| numbers[row * width..(row + 1) * width].to_vec()).collect();
+        }
+        if !self.is_unsettled.is_empty() {
+            self.is_unsettled = kept().map(|row| self.is_unsettled[row]).collect();
+        }
+    }
+
     /// Gives every so-manieth row the memory that began a few seconds before, so that a network learns what to make of one.
     pub fn make_young(&mut self, every: usize) {
         let places = self.young_places.len() / self.rows().max(1);
