@@ -115,6 +115,22 @@ impl Card {
         Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, bound95_unsettled_mm, golden })
     }
 
+    /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one.
+    ///
+    /// # Errors
+    /// [`CardError::Numbers`].
+    pub fn check_memory(&self, has_memory: bool) -> Result<(), CardError> {
+        let wrong = |problem: &str| Err(CardError::Numbers { key: "ravenpose.bound95_unsettled_mm", problem: problem.to_owned() });
+        let stated = self.bound95_unsettled_mm.iter().all(|bound| bound.is_finite());
+        if self.bound95_unsettled_mm.iter().zip(self.bound95_mm).any(|(unsettled, settled)| *unsettled < settled) {
+            return wrong("is narrower than ravenpose.bound95_mm");
+        }
+        if stated && !has_memory {
+            return wrong("the network has no memory");
+        }
+        Ok(())
+    }
+
     /// Golden pairs are taken from training, so one outside of the trained range shows that the range is of another feature order
     /// or in other units, which the network's outputs alone cannot show.
     ///

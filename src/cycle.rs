@@ -5,7 +5,8 @@
 //! why; the correction comes back after 100 good cycles in a row, slewed.
 
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
-use crate::guard::{Guard, Verdict};
+use crate::guard::Guard;
+use crate::memory::may_follow;
 use nalgebra::Vector3;
 use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
 
@@ -17,9 +18,6 @@ const FUTURE_NS: i64 = 1_000_000;
 const WARM_ROUNDS: usize = 16;
 /// A larger gap in the sequence is a restart of the source, not a loss.
 const GAP_MAX: u64 = 10_000;
-/// After so many periods without a state that could be followed an estimator forgets. A joint that turns twice within 20 ms, at the
-/// 10 rad/s^2 that its motor gives it, comes 0.25 mrad far: a sixth of the narrowest play.
-const UNSEEN_PERIODS: i64 = 20;
 
 /// What evaluates the network: 118 features to a position error in mm. Nothing here may allocate, block or panic.
 pub trait Estimator {
@@ -28,8 +26,8 @@ pub trait Estimator {
         false
     }
 
-    /// Takes in a state, which is the newest from now on.
-    fn follow(&mut self, _features: &[f32; FEATURES]) {}
+    /// Takes in a state of a time that rises, ns; it is the newest from now on.
+    fn follow(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
 
     /// Forgets all states: the arm may have moved unseen.
     fn forget(&mut self) {}
@@ -39,7 +37,7 @@ pub trait Estimator {
         true
     }
 
-    /// Evaluates the features that it followed last.
+    /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
     fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]);
 
     /// Does a microsecond's worth of what makes the next run fast; changes no result.
@@ -153,9 +151,9 @@ impl Stopwatch for () {}
 
 struct Arm<E> {
     model: ArmModel<E>,
-    /// Source time of the state that the estimator followed last.
-    followed_ns: i64,
     frozen: FrozenWatch,
+    /// Did the newest judged state show encoders that stand still?
+    is_frozen: bool,
     correction_um: Vector3<f64>,
     hold: u32,
     /// Why the hold began, kept while it lasts.
@@ -191,8 +189,8 @@ impl<E: Estimator> Cycle<E> {
     pub fn new(limits: Limits, models: [ArmModel<E>; ARMS], allow_untrained: bool, standing_flags: u32) -> Self {
         let arms = models.map(|model| Arm {
             model,
-            followed_ns: i64::MIN,
             frozen: FrozenWatch::default(),
+            is_frozen: false,
             correction_um: Vector3::zeros(),
             hold: limits.good_cycles,
             hold_flags: 0,
@@ -320,10 +318,16 @@ impl<E: Estimator> Cycle<E> {
     fn remember_overtaken(&mut self) {
         for (index, arm) in self.arms.iter_mut().enumerate() {
             let ArmModel::Loaded(model) = &mut arm.model else { continue };
-            if model.estimator.remembers() && self.newest.connected() & (1 << index) != 0 {
-                features::extract(&self.newest, index, &mut self.features);
-                let verdict = model.guard.check(&self.features);
-                model.follow(verdict, &self.newest, &self.features, &self.limits, &mut arm.followed_ns);
+            if !model.estimator.remembers() {
+                continue;
+            }
+            if self.newest.connected() & (1 << index) == 0 {
+                model.estimator.forget();
+                continue;
+            }
+            features::extract(&self.newest, index, &mut self.features);
+            if !arm.is_frozen && may_follow(model.guard.check(&self.features).reasons) {
+                model.estimator.follow(&self.features, self.newest.source_time_ns);
             }
         }
     }
@@ -466,20 +470,6 @@ struct Judgement {
     target_um: Vector3<f64>,
 }
 
-impl<E: Estimator> Model<E> {
-    /// Lets the estimator follow a state, whether it is corrected or not, unless its numbers cannot be the robot's.
-    fn follow(&mut self, verdict: Verdict, state: &RavenState, features: &[f32; FEATURES], limits: &Limits, followed_ns: &mut i64) {
-        if verdict.reasons & (flag::INPUT_NOT_FINITE | flag::INPUT_IMPOSSIBLE) != 0 {
-            return;
-        }
-        if state.source_time_ns.saturating_sub(*followed_ns) > limits.period_ns.saturating_mul(UNSEEN_PERIODS) {
-            self.estimator.forget();
-        }
-        *followed_ns = state.source_time_ns;
-        self.estimator.follow(features);
-    }
-}
-
 impl<E: Estimator> Arm<E> {
     /// What the estimator remembers is of another source, or of before a disconnection.
     fn forget(&mut self) {
@@ -511,7 +501,9 @@ impl<E: Estimator> Arm<E> {
     ) -> Judgement {
         let (reasons, information) = self.standing(allow_untrained);
         let mut judged = Judgement { reasons: common | reasons, information, score: -1.0, target_um: Vector3::zeros() };
-        match self.frozen.observe(state, index) {
+        let still = self.frozen.observe(state, index);
+        self.is_frozen = still >= FROZEN_AFTER;
+        match still {
             FROZEN_AFTER.. => judged.reasons |= flag::INPUT_FROZEN,
             DEGRADED_AFTER.. => judged.information |= flag::DEGRADED,
             _ => {}
@@ -520,7 +512,9 @@ impl<E: Estimator> Arm<E> {
         let verdict = model.guard.check(features);
         judged.reasons |= verdict.reasons;
         judged.score = verdict.score;
-        model.follow(verdict, state, features, limits, &mut self.followed_ns);
+        if may_follow(judged.reasons) {
+            model.estimator.follow(features, state.source_time_ns);
+        }
         if judged.reasons != 0 {
             return judged;
         }
@@ -613,7 +607,7 @@ impl<E: Estimator> Arm<E> {
         self.correction_um = Vector3::zeros();
         self.hold = limits.good_cycles;
         self.hold_flags |= reasons & flag::NEW_SOURCE;
-        out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING);
+        out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING | flag::MEMORY_UNSETTLED);
         self.show_raw(reasons | self.hold_flags, out);
         if announced {
             out.flags |= flag::RESET;

@@ -147,8 +147,8 @@ impl Estimator for Estimate {
         !self.memory.is_empty()
     }
 
-    fn follow(&mut self, features: &[f32; FEATURES]) {
-        self.memory.follow(features);
+    fn follow(&mut self, features: &[f32; FEATURES], time_ns: i64) {
+        self.memory.follow(features, time_ns);
     }
 
     fn forget(&mut self) {
@@ -209,6 +209,7 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let card = Card::read(&network.metadata).map_err(unusable)?;
     check_golden(&path, &mut Estimate::new(&network, Plan::new(&network)), &card)?;
     card.check_range().map_err(unusable)?;
+    card.check_memory(!network.plays.is_empty()).map_err(unusable)?;
     // Places of a memory that has seen nothing else are zero.
     let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len()]].concat();
     let golden: Vec<Vec<f32>> = card.golden.iter().map(seen).collect();

@@ -126,6 +126,13 @@ fn million() -> ! {
             for _ in 0..count {
                 sequence += 1;
                 writer.send(&faulty(sequence)).expect("state sent");
+                if sequence % 100 == 0 {
+                    // Two more overtake it.
+                    for _ in 0..2 {
+                        sequence += 1;
+                        writer.send(&faulty(sequence)).expect("state sent");
+                    }
+                }
                 runner.turn();
                 if sequence % 1000 == 0 {
                     // Nothing comes: a period of polling, and of keeping the weights warm.

@@ -12,9 +12,10 @@
 //!
 //! Here that part is checked against this very form and cut off; the rest is a chain like any other.
 
+use tract_onnx::pb::attribute_proto::AttributeType;
 use tract_onnx::pb::tensor_proto::DataType;
 use tract_onnx::pb::tensor_shape_proto::dimension::Value as Dim;
-use tract_onnx::pb::{GraphProto, NodeProto, TensorProto, ValueInfoProto, type_proto};
+use tract_onnx::pb::{AttributeProto, GraphProto, NodeProto, TensorProto, ValueInfoProto, type_proto};
 
 use crate::error::ImportError;
 use crate::limits::PLAYS_MAX;
@@ -26,6 +27,9 @@ const OUT: &str = "memory_out";
 const FEATURES: &str = "memory.features";
 const HALF_WIDTHS: &str = "memory.half_widths";
 const INPUTS: &str = "memory.inputs";
+
+/// What is drawn from other values; nothing else in the file may be called so.
+const OWN: [&str; 8] = ["memory.x", "memory.lower", "memory.upper", "memory.above", "memory.moved", OUT, "memory.places", INPUTS];
 
 /// Operator, inputs and output of each node; `@` stands for the graph's own input.
 const NODES: [(&str, &[&str], &str); 8] = [
@@ -53,7 +57,9 @@ pub(crate) fn cut(graph: &mut GraphProto, inputs: usize) -> Result<Vec<Play>, Im
         return Err(wrong(format!("{absent} is no input of the graph")));
     }
     check_nodes(graph, &own)?;
+    check_names(graph, &own)?;
     let plays = plays(graph, inputs)?;
+    check_ports(graph, plays.len())?;
     check_default(graph, MEMORY, DataType::Float, plays.len())?;
     check_default(graph, REMEMBERED, DataType::Bool, 1)?;
     graph.node.drain(..NODES.len());
@@ -61,7 +67,6 @@ pub(crate) fn cut(graph: &mut GraphProto, inputs: usize) -> Result<Vec<Play>, Im
     graph.input.retain(|one| one.name != MEMORY && one.name != REMEMBERED);
     graph.output.retain(|one| one.name != OUT);
     let widened = graph.input.iter_mut().find(|one| one.name == own).is_some_and(|one| widen(one, inputs, plays.len()));
-    // Of another width: left as it is, and refused by its declared shape.
     if widened { Ok(plays) } else { Err(wrong(format!("the graph's input is not [1, {inputs}]"))) }
 }
 
@@ -99,11 +104,41 @@ fn check_nodes(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
 
 /// Whether its only attribute is `axis = 1`, or it has none where it needs none.
 fn has_axis(node: &NodeProto, wanted: bool) -> bool {
+    let axis = || AttributeProto { name: "axis".to_owned(), r#type: AttributeType::Int as i32, i: 1, ..AttributeProto::default() };
     match node.attribute.as_slice() {
         [] => !wanted,
-        [one] => wanted && one.name == "axis" && one.i == 1,
+        [one] => wanted && *one == axis(),
         _ => false,
     }
+}
+
+/// What is cut off is checked by nobody else: a second value of such a name would take its place.
+fn check_names(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
+    let stored = graph.initializer.iter().map(|one| one.name.as_str());
+    let later = graph.node.iter().skip(NODES.len()).flat_map(|node| &node.output).map(String::as_str);
+    match stored.chain(later).chain([own]).find(|name| OWN.contains(name)) {
+        Some(name) => Err(wrong(format!("{name} is defined twice"))),
+        None => Ok(()),
+    }
+}
+
+/// The memory's own inputs and output, as they are declared.
+fn check_ports(graph: &GraphProto, plays: usize) -> Result<(), ImportError> {
+    let wanted = [(MEMORY, DataType::Float, plays), (REMEMBERED, DataType::Bool, 1), (OUT, DataType::Float, plays)];
+    for port in graph.input.iter().chain(&graph.output) {
+        let Some((name, data_type, width)) = wanted.iter().find(|(name, ..)| port.name == *name) else { continue };
+        let Some(type_proto::Value::TensorType(tensor)) = port.r#type.as_ref().and_then(|kind| kind.value.as_ref()) else {
+            return Err(wrong(format!("{name} has no declared type")));
+        };
+        let dims = tensor.shape.iter().flat_map(|shape| &shape.dim).map(|dim| match dim.value {
+            Some(Dim::DimValue(value)) => value,
+            _ => 0,
+        });
+        if tensor.elem_type != *data_type as i32 || !dims.eq([1, *width as i64]) {
+            return Err(wrong(format!("{name} is not declared as {} [1, {width}]", data_type.as_str_name())));
+        }
+    }
+    Ok(())
 }
 
 fn stored<'a>(graph: &'a GraphProto, name: &str) -> Result<&'a TensorProto, ImportError> {

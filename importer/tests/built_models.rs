@@ -321,7 +321,7 @@ fn a_memory_of_another_form_is_refused_whatever_is_different() {
     fn stored<'a>(graph: &'a mut tract_onnx::pb::GraphProto, name: &str) -> &'a mut TensorProto {
         graph.initializer.iter_mut().find(|one| one.name == name).unwrap()
     }
-    let changes: [(&str, Change); 18] = [
+    let changes: [(&str, Change); 25] = [
         ("node 3 is not the Max", |graph| graph.node[3].op_type = "Min".into()),
         ("node 1 is not the Sub", |graph| graph.node[1].input.swap(0, 1)),
         ("node 4 is not the Min", |graph| graph.node.swap(4, 5)),
@@ -341,6 +341,15 @@ fn a_memory_of_another_form_is_refused_whatever_is_different() {
         ("remembered does not begin with zeros", |graph| stored(graph, "remembered").raw_data[0] = 1),
         ("not stored exactly once", |graph| graph.initializer.retain(|one| one.name != "memory.half_widths")),
         ("remembered is no input", |graph| graph.input.retain(|one| one.name != "remembered")),
+        ("node 0 is not the Gather", |graph| graph.node[0].attribute[0].r#type = 1),
+        ("node 7 is not the Concat", |graph| graph.node[7].attribute[0].ref_attr_name = "axis".into()),
+        ("memory.lower is defined twice", |graph| graph.initializer.push(common::tensor("memory.lower", &[1], &[0.5]))),
+        ("memory.inputs is defined twice", |graph| graph.node[9].output[0] = "memory.inputs".into()),
+        ("memory_out is defined twice", |graph| graph.node[9].output[0] = "memory_out".into()),
+        ("memory is not declared as FLOAT [1, 2]", |graph| graph.input[1] = port("memory", None, 2)),
+        ("remembered is not declared as BOOL [1, 1]", |graph| {
+            graph.input[2] = port("remembered", Some(dimension::Value::DimValue(1)), 1);
+        }),
         ("the graph's input is not [1, 5]", |graph| graph.input[0] = port("raw", None, 6)),
     ];
     for (what, change) in changes {

@@ -59,9 +59,13 @@ pub(crate) fn tensor(name: &str, dims: &[i64], values: &[f32]) -> TensorProto {
 }
 
 pub(crate) fn port(name: &str, batch: Option<dimension::Value>, width: i64) -> ValueInfoProto {
+    typed_port(name, 1, batch, width)
+}
+
+pub(crate) fn typed_port(name: &str, elem_type: i32, batch: Option<dimension::Value>, width: i64) -> ValueInfoProto {
     let width = Dimension { value: Some(dimension::Value::DimValue(width)), ..Default::default() };
     let shape = TensorShapeProto { dim: vec![Dimension { value: batch, ..Default::default() }, width] };
-    let value = Some(type_proto::Value::TensorType(type_proto::Tensor { elem_type: 1, shape: Some(shape) }));
+    let value = Some(type_proto::Value::TensorType(type_proto::Tensor { elem_type, shape: Some(shape) }));
     ValueInfoProto { name: name.into(), r#type: Some(TypeProto { value, ..Default::default() }), ..Default::default() }
 }
 
@@ -203,7 +207,7 @@ pub(crate) fn remember(mut model: ModelProto, inputs: usize, plays: &[(i64, f32)
     let own = std::mem::replace(&mut graph.input[0], port("raw", one.clone(), inputs as i64)).name;
     let n = plays.len() as i64;
     graph.input.push(port("memory", one.clone(), n));
-    graph.input.push(port("remembered", one.clone(), 1));
+    graph.input.push(typed_port("remembered", 9, one.clone(), 1));
     graph.output.push(port("memory_out", one, n));
     let widths: Vec<f32> = plays.iter().map(|(_, width)| *width).collect();
     let features = plays.iter().flat_map(|(feature, _)| feature.to_le_bytes()).collect();

@@ -95,10 +95,14 @@ fn words(report: &Report) -> String {
         "95 % bound holds in {:.1} % (by run {:.1} to {:.1} %); out of range {:.2} %, out of domain {:.2} % of the rows",
         trust.coverage_all, trust.coverage_of_runs.0, trust.coverage_of_runs.1, trust.out_of_range, trust.out_of_domain
     ));
-    if let Some(unsettled) = &trust.unsettled {
+    if let Some(words) = trust.settled() {
+        lines.push(format!("by run {words}"));
+    }
+    for unsettled in &trust.unsettled {
+        let holds = unsettled.coverage.map_or("no bound stated".to_owned(), |share| format!("its own bound holds in {share:.1} %"));
         lines.push(format!(
-            "memory begun less than 8 s before ({} rows): {:.3} RMS left, its own bound holds in {:.1} %",
-            unsettled.rows, unsettled.rms, unsettled.coverage
+            "memory {} to {} s old, not settled ({} rows): {:.3} RMS left, {holds}",
+            unsettled.age_s.0, unsettled.age_s.1, unsettled.rows, unsettled.rms
         ));
     }
     lines.join("\n") + "\n"

@@ -44,7 +44,8 @@ pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in
             if !in_order {
                 estimate.forget();
             }
-            estimate.follow(&features);
+            // A period apart, as states are.
+            estimate.follow(&features, rows as i64 * 1_000_000);
             estimate.run(&features, &mut error_mm);
             if let Some(value) = error_mm.iter().find(|value| !value.is_finite()) {
                 return Err(format!(

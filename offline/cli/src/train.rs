@@ -137,7 +137,7 @@ fn recipe(file: &Path) -> Result<Recipe, String> {
         .map_err(|cause| format!("{name}: cannot be read: {cause}; give the best.json of `ravenpose search`"))?;
     let recipe: Recipe = serde_json::from_str(&text)
         .map_err(|error| format!("{name}: line {}: {error}; give the best.json of `ravenpose search`", error.line()))?;
-    if recipe.hidden.is_empty() || recipe.hidden.contains(&0) || recipe.batch == 0 || !(recipe.rate > 0.0) {
+    if recipe.hidden.is_empty() || recipe.hidden.contains(&0) || recipe.batch == 0 || recipe.rate.is_nan() || recipe.rate <= 0.0 {
         return Err(format!("{name}: hidden, batch and rate must be above 0"));
     }
     Ok(recipe)

@@ -61,7 +61,7 @@ fn the_service_loads_what_was_trained_and_infer_gives_the_golden_outputs() {
     let folder = Folder::new("service");
     let runs = folder.runs();
     let runs: Vec<&str> = runs.iter().map(String::as_str).collect();
-    for preset in ["default", "paper", "paper-code"] {
+    for preset in ["default", "one-state", "paper", "paper-code"] {
         let out = folder.file(&format!("{preset}.onnx"));
         let options = ["train", "--preset", preset, "--epochs", "2", "--truth-noise", "0.5", "--out", text(&out), "--data"];
         let said = good(&ravenpose(&[&options[..], &runs].concat()));
@@ -97,6 +97,42 @@ fn runs_after_one_homing_have_its_offset_and_different_motions() {
     assert_eq!(offsets.len(), 1, "{summary}");
     let length = |run: usize| std::fs::metadata(folder.file("runs").join(format!("run_{run:04}.mcap"))).expect("run").len();
     assert_ne!(length(1), length(2));
+}
+
+#[test]
+fn infer_remembers_from_row_to_row_where_it_is_told_that_they_are_in_order() {
+    let folder = Folder::new("in-order");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/raven2-worn.onnx");
+    let mut model = model::load(&source(&path)).expect("the shipped model");
+    // Joint 1 goes there and back; everything else stands as in a golden input.
+    let mut states = vec![model.card.golden[0].input; 400];
+    for (k, state) in states.iter_mut().enumerate() {
+        state[56] += 0.05 * k.min(400 - k) as f32;
+    }
+    let header: Vec<String> = (0..118).map(|input| format!("in_{input}")).collect();
+    let rows: Vec<String> = states.iter().map(|row| row.map(|x| x.to_string()).join(",")).collect();
+    let (table, out) = (folder.file("in.csv"), folder.file("out.csv"));
+    std::fs::write(&table, format!("{}\n{}\n", header.join(","), rows.join("\n"))).expect("rows");
+    let run = |more: &[&str]| -> Vec<Vec<f32>> {
+        let arguments = ["infer", "--model", text(&path), text(&table), "--out", text(&out)];
+        good(&ravenpose(&[&arguments[..], more].concat()));
+        let found = std::fs::read_to_string(&out).expect("outputs");
+        found.lines().skip(1).map(|line| line.split(',').map(|x| x.parse().expect("number")).collect()).collect()
+    };
+    let (alone, in_order) = (run(&[]), run(&["--in-order"]));
+    let mut worst = 0.0_f32;
+    for (k, state) in states.iter().enumerate() {
+        let mut expected = [0.0; 3];
+        model.model.estimator.follow(state, k as i64 * 1_000_000);
+        model.model.estimator.run(state, &mut expected);
+        for (found, expected) in in_order[k].iter().zip(expected) {
+            // The service has weights of 16 bits.
+            assert!((found - expected).abs() < 0.01, "{k}: {found} {expected}");
+        }
+        worst = in_order[k].iter().zip(&alone[k]).map(|(a, b)| (a - b).abs()).fold(worst, f32::max);
+    }
+    assert_eq!(in_order[0], alone[0]);
+    assert!(worst > 0.02, "the memory makes a difference: {worst} mm");
 }
 
 /// The cameras' world against frame 0: x0 = -y + 0.1, y0 = x - 0.2, z0 = z + 0.3 (m).

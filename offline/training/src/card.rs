@@ -2,6 +2,7 @@
 
 use crate::chain::Chain;
 use crate::data::Trajectory;
+use crate::data::memory::AGES_S;
 use crate::prepare::Prepared;
 use ravenpose_wire::{FEATURES, features};
 use std::collections::BTreeMap;
@@ -73,6 +74,19 @@ pub fn bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec
         .collect()
 }
 
+/// The same while a memory has not settled: the widest over its ages, and no narrower than that of a settled one. NaN where no memory
+/// was unsettled.
+fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec<f64> {
+    let of_age =
+        |age_s| bounds(chain, &validation.iter().map(|one: &Trajectory| one.unsettled(age_s)).collect::<Vec<_>>(), truth_noise);
+    let ages: Vec<Vec<f64>> = AGES_S.iter().map(of_age).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())).collect();
+    if ages.is_empty() {
+        return vec![f64::NAN; chain.outputs()];
+    }
+    let settled = bounds(chain, validation, truth_noise);
+    ages.iter().fold(settled, |widest, bounds| widest.iter().zip(bounds).map(|(a, b)| a.max(*b)).collect())
+}
+
 /// The smallest value with at least this share of the weight at or below it.
 fn quantile(weighted: &mut [(f64, f64)], share: f64) -> f64 {
     weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -97,8 +111,7 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
         if !facts.chain.plays.is_empty() {
-            let unsettled: Vec<Trajectory> = facts.validation.iter().map(Trajectory::unsettled).collect();
-            let bounds = bounds(facts.chain, &unsettled, facts.truth_noise_mm);
+            let bounds = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm);
             if bounds.iter().all(|bound| bound.is_finite()) {
                 put("bound95_unsettled_mm", words(&bounds));
             }

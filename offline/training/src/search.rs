@@ -119,8 +119,12 @@ pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Tr
     let outputs = set.outputs();
     let split = Split::draw(set.trajectories.len(), wish.base.seed)?;
     let Parts { mut train, mut validation, .. } = Parts::of(&mut set, &split);
-    train.iter_mut().chain(&mut validation).for_each(|one| one.thin(wish.every));
-    train.iter_mut().for_each(|one| one.make_young(YOUNG_EVERY));
+    for one in train.iter_mut().chain(&mut validation) {
+        one.thin(wish.every);
+    }
+    for one in &mut train {
+        one.make_young(YOUNG_EVERY);
+    }
     let cannot = |error: std::io::Error| TrainingError::file(wish.out, format!("cannot be made: {error}"), "choose another --out");
     fs::create_dir_all(wish.out).map_err(cannot)?;
     let mut file = Finished::open(&wish.out.join(TRIALS), &identity(wish, &train, &validation))?;

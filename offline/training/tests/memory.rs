@@ -27,12 +27,13 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
     let mut model = ravenpose::model::load(&source).expect("the service takes it").model;
     assert!(model.estimator.remembers() && !model.estimator.is_settled());
     let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
-    let (mut found, mut row) = (Vec::new(), [0.0_f32; FEATURES]);
+    let (mut found, mut row, mut time_ns) = (Vec::new(), [0.0_f32; FEATURES], 0);
     while let Some(record) = source.next().expect("record") {
         match record {
             Record::State(state) => {
                 features::extract(&state, 0, &mut row);
-                model.estimator.follow(&row);
+                time_ns += 1_000_000;
+                model.estimator.follow(&row, time_ns);
             }
             Record::Truth(_) => {
                 let mut error_mm = [0.0; 3];
@@ -46,7 +47,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
     assert!(worst < 1e-4, "{worst} mm");
     // And the memory matters: without it the answers are others.
     model.estimator.forget();
-    model.estimator.follow(&row);
+    model.estimator.follow(&row, time_ns + 1);
     let mut alone = [0.0; 3];
     model.estimator.run(&row, &mut alone);
     let last = &expected[expected.len() - 3..];
@@ -59,7 +60,7 @@ fn rows_with_a_young_memory_are_those_of_a_run_that_began_then() {
     let files = runs(&folder, 1, 6.0, ".mcap");
     let reading = Reading { plays: plays(&small("default")), truth_hz: 1000.0, ..Reading::default() };
     let one = &data::read(&files, &reading, &mut |_, _| {}).expect("run").trajectories[0];
-    let unsettled = one.unsettled();
+    let unsettled = one.unsettled(&(0.0..8.0));
     assert!(unsettled.rows() > 500 && unsettled.rows() <= one.rows(), "{} of {}", unsettled.rows(), one.rows());
     // The second memory began after a second and again after three: its first row then knows nothing.
     let places = one.young_places.len() / one.rows();

@@ -1,6 +1,7 @@
 //! Which plays a model of a RAVEN-II has in front of its network; how they work is the service's own (`ravenpose::memory`).
 
 use ravenpose::memory::Play;
+use std::ops::Range;
 
 /// First feature of `jpos`.
 const JPOS: usize = 56;
@@ -17,6 +18,9 @@ const PLAYS: [(usize, [f64; PER_JOINT]); 7] = [
     (6, [0.04, 0.1, 0.3]),
     (7, [0.04, 0.1, 0.3]),
 ];
+
+/// Ages of a memory, s, for which its worth is told apart while it has not settled.
+pub const AGES_S: [Range<f64>; 4] = [0.0..1.0, 1.0..2.0, 2.0..4.0, 4.0..8.0];
 
 /// All plays, in the unit of the features.
 pub fn plays() -> Vec<Play> {

@@ -10,6 +10,7 @@ use crate::random::Random;
 use ravenpose::memory::Play;
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
+use std::ops::Range;
 use std::path::PathBuf;
 
 pub use noise::add_noise;
@@ -30,8 +31,10 @@ pub struct Trajectory {
     pub exact: Vec<f32>,
     /// Row-major, as many numbers per row as a memory adds: what those would be had it begun a few seconds before.
     pub young_places: Vec<f32>,
-    /// Per row: had such a memory not settled yet?
-    pub is_unsettled: Vec<bool>,
+    /// Per row: how long before that memory began, s; NaN where it has settled since.
+    pub unsettled_s: Vec<f64>,
+    /// How long the run's own memory took to settle, s from its first state; none if it never did, or there is none.
+    pub settled_after_s: Option<f64>,
 }
 
 impl Trajectory {
@@ -55,16 +58,16 @@ impl Trajectory {
         self.time_s.len()
     }
 
-    /// The rows that a memory had not settled in, as it had them then; no rows where there is no memory.
+    /// The rows in which a memory of such an age had not settled, as it had them then; no rows where there is no memory.
     #[must_use]
-    pub fn unsettled(&self) -> Self {
+    pub fn unsettled(&self, age_s: &Range<f64>) -> Self {
         let places = self.young_places.len() / self.rows().max(1);
         let (inputs, outputs) = (self.inputs.len() / self.rows().max(1), self.labels.len() / self.rows().max(1));
         let mut found = Self { name: self.name.clone(), ..Self::default() };
         if places == 0 {
             return found;
         }
-        for row in (0..self.rows()).filter(|row| self.is_unsettled[*row]) {
+        for row in (0..self.rows()).filter(|row| age_s.contains(&self.unsettled_s[*row])) {
             found.time_s.push(self.time_s[row]);
             found.inputs.extend_from_slice(&self.inputs[row * inputs..(row + 1) * inputs - places]);
             found.inputs.extend_from_slice(&self.young_places[row * places..(row + 1) * places]);
@@ -84,8 +87,8 @@ impl Trajectory {
             let width = numbers.len() / rows.max(1);
             *numbers = kept().flat_map(|row| numbers[row * width..(row + 1) * width].to_vec()).collect();
         }
-        if !self.is_unsettled.is_empty() {
-            self.is_unsettled = kept().map(|row| self.is_unsettled[row]).collect();
+        if !self.unsettled_s.is_empty() {
+            self.unsettled_s = kept().map(|row| self.unsettled_s[row]).collect();
         }
     }
 

@@ -4,7 +4,8 @@ use super::memory;
 use super::{DataSet, Reading, Trajectory};
 use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
-use ravenpose::memory::{Memory, Play};
+use ravenpose::guard::Guard;
+use ravenpose::memory::{Memory, Play, may_follow_recorded};
 use ravenpose_wire::{FEATURES, RavenState, features};
 use recordings::open::{Opened, open};
 use recordings::stream::{Record, Truth};
@@ -62,10 +63,13 @@ struct Pairing<'a> {
     period_ns: i64,
     state: Option<Box<RavenState>>,
     features: [f32; FEATURES],
+    possible: Guard,
     memory: Memory,
+    begun_ns: Option<i64>,
     young: Memory,
     /// How often it began anew, and when it does so next.
     young_begun: usize,
+    young_since_ns: i64,
     young_until_ns: i64,
     state_ns: i64,
     start_ns: Option<i64>,
@@ -84,9 +88,12 @@ impl<'a> Pairing<'a> {
             period_ns: (1e9 / reading.truth_hz.max(1e-3)) as i64,
             state: None,
             features: [0.0; FEATURES],
+            possible: Guard::new(None),
             memory: Memory::new(&reading.plays),
+            begun_ns: None,
             young: Memory::new(&reading.plays),
             young_begun: 0,
+            young_since_ns: i64::MIN,
             young_until_ns: i64::MIN,
             state_ns: 0,
             start_ns: None,
@@ -99,13 +106,23 @@ impl<'a> Pairing<'a> {
         let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
         self.state_ns = stamp_ns;
         features::extract(&state, self.side.index(), &mut self.features);
-        self.memory.follow(&self.features);
+        // As the service does it: what cannot be the robot's is not followed.
+        if !may_follow_recorded(&self.possible, &self.features) {
+            self.state = Some(state);
+            return;
+        }
+        let begun_ns = *self.begun_ns.get_or_insert(stamp_ns);
+        self.memory.follow(&self.features, stamp_ns);
+        if !self.memory.is_empty() && self.found.settled_after_s.is_none() && self.memory.is_settled() {
+            self.found.settled_after_s = Some(stamp_ns.saturating_sub(begun_ns) as f64 * 1e-9);
+        }
         if stamp_ns >= self.young_until_ns {
             self.young.forget();
+            self.young_since_ns = stamp_ns;
             self.young_until_ns = stamp_ns + (YOUNG_S[self.young_begun % YOUNG_S.len()] * 1e9) as i64;
             self.young_begun += 1;
         }
-        self.young.follow(&self.features);
+        self.young.follow(&self.features, stamp_ns);
         self.state = Some(state);
     }
 
@@ -143,7 +160,8 @@ impl<'a> Pairing<'a> {
         self.found.inputs.extend_from_slice(&places);
         self.young.places(&inputs, &mut places);
         self.found.young_places.extend_from_slice(&places);
-        self.found.is_unsettled.push(!self.young.is_settled());
+        let age_s = self.state_ns.saturating_sub(self.young_since_ns) as f64 * 1e-9;
+        self.found.unsettled_s.push(if self.young.is_settled() { f64::NAN } else { age_s });
         self.found.labels.extend(label.map(|part| part as f32));
         Ok(())
     }

@@ -3,6 +3,8 @@
 use super::{Rest, Trust, Unsettled};
 use crate::commands::Model;
 use crate::data::Trajectory;
+use crate::data::memory::AGES_S;
+use std::ops::Range;
 
 /// Inputs named in the report at most.
 const LEAVING: usize = 6;
@@ -39,14 +41,18 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
     leaving.sort_by(|a, b| b.1.total_cmp(&a.1));
     leaving.truncate(LEAVING);
     trust.leaving = leaving;
-    trust.unsettled = unsettled(model, test, numbers("ravenpose.bound95_unsettled_mm"));
+    if !model.chain.plays.is_empty() {
+        trust.settled_after_s = test.iter().map(|one| one.settled_after_s).collect();
+    }
+    trust.bound95_unsettled = numbers("ravenpose.bound95_unsettled_mm");
+    trust.unsettled = AGES_S.iter().filter_map(|age_s| unsettled(model, test, &trust.bound95_unsettled, age_s)).collect();
     trust
 }
 
-fn unsettled(model: &Model, test: &[Trajectory], bound95: Vec<f64>) -> Option<Unsettled> {
+fn unsettled(model: &Model, test: &[Trajectory], bound95: &[f64], age_s: &Range<f64>) -> Option<Unsettled> {
     let outputs = model.chain.outputs().max(1);
     let (mut squares, mut rows, mut inside) = (0.0_f64, 0_usize, 0_usize);
-    for one in test.iter().map(Trajectory::unsettled) {
+    for one in test.iter().map(|one| one.unsettled(age_s)) {
         let estimate = model.chain.estimate(&one.inputs);
         rows += one.rows();
         for (at, (truth, estimate)) in one.exact.iter().zip(&estimate).enumerate() {
@@ -56,8 +62,13 @@ fn unsettled(model: &Model, test: &[Trajectory], bound95: Vec<f64>) -> Option<Un
         }
     }
     let n = rows.max(1) as f64;
-    let coverage = 100.0 * inside as f64 / (n * outputs as f64);
-    (rows > 0).then(|| Unsettled { rows, rms: (squares / n).sqrt(), bound95, coverage })
+    Some(Unsettled {
+        age_s: (age_s.start, age_s.end),
+        rows,
+        rms: (squares / n).sqrt(),
+        coverage: (!bound95.is_empty()).then(|| 100.0 * inside as f64 / (n * outputs as f64)),
+    })
+    .filter(|_| rows > 0)
 }
 
 fn coverage(trust: &mut Trust, test: &[Trajectory], estimates: &[Rest]) {

@@ -76,21 +76,35 @@ pub struct Trust {
     pub out_of_domain: f64,
     /// Inputs that left their range most often, with the share of rows, percent.
     pub leaving: Vec<(String, f64)>,
-    /// The rows again with a memory that began a few seconds before and had not settled; none where the model has no memory.
-    pub unsettled: Option<Unsettled>,
+    /// The rows again with a memory that began a few seconds before and had not settled, by its age; none where the model has no memory.
+    pub unsettled: Vec<Unsettled>,
+    /// Per run: how long its memory took to settle, s; none if it never did.
+    pub settled_after_s: Vec<Option<f64>>,
+    /// Half widths that the card states for those rows; none if it states none.
+    pub bound95_unsettled: Vec<f64>,
+}
+
+impl Trust {
+    /// When the memory of each run had settled, in words; none for a model without a memory.
+    pub fn settled(&self) -> Option<String> {
+        let one = |after_s: &Option<f64>| after_s.map_or("never".to_owned(), |after_s| format!("{after_s:.1} s"));
+        let all: Vec<String> = self.settled_after_s.iter().map(one).collect();
+        (!all.is_empty()).then(|| format!("the memory settled after: {}", all.join(", ")))
+    }
 }
 
 /// What a model with a memory is good for soon after its start.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Unsettled {
-    /// Rows in which such a memory had not settled.
+    /// Age of the memory, s: from, to.
+    pub age_s: (f64, f64),
+    /// Rows in which it had not settled.
     pub rows: usize,
+
     /// RMS of the vector that is left of them, against the truth without added noise.
     pub rms: f64,
-    /// Half widths that the card states for them.
-    pub bound95: Vec<f64>,
-    /// Share of those rows within the bound over all axes, percent.
-    pub coverage: f64,
+    /// Share of those rows within the stated bound over all axes, percent; none where none is stated.
+    pub coverage: Option<f64>,
 }
 
 /// The whole report.
@@ -164,6 +178,14 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         return Err(TrainingError::Model { file: shown(wish.model), what });
     }
     let outputs = set.outputs();
+    if !set.is_raven && !model.chain.plays.is_empty() {
+        let what = "has a memory of a RAVEN-II's joints".to_owned();
+        return Err(TrainingError::Unfit {
+            file: shown(wish.model),
+            what,
+            remedy: "give recordings of its states, without --inputs",
+        });
+    }
     let own_inputs = set.inputs() - model.chain.plays.len();
     let (train, test, known) = parts(&model, set.trajectories);
     if test.is_empty() {

@@ -124,13 +124,17 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
             trust.out_of_range, trust.out_of_domain
         ),
     ];
-    if let Some(unsettled) = &trust.unsettled {
+    if !trust.bound95_unsettled.is_empty() {
+        lines.push(format!("Half widths while the memory has not settled: {} {unit}.", list(&trust.bound95_unsettled, 3)));
+    }
+    if let Some(words) = trust.settled() {
+        lines.push(format!("By run {words}."));
+    }
+    for unsettled in &trust.unsettled {
+        let holds = unsettled.coverage.map_or("no bound is stated".to_owned(), |share| format!("that bound holds in {share:.1} %"));
         lines.push(format!(
-            "With a memory that began 0 to 8 s before and has not settled ({} rows): {:.3} {unit} RMS left; half widths {} hold in {:.1} %.",
-            unsettled.rows,
-            unsettled.rms,
-            list(&unsettled.bound95, 3),
-            unsettled.coverage
+            "Memory {} to {} s old and not settled ({} rows): {:.3} {unit} RMS left; {holds}.",
+            unsettled.age_s.0, unsettled.age_s.1, unsettled.rows, unsettled.rms
         ));
     }
     if !trust.leaving.is_empty() {

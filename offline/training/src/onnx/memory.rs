@@ -53,7 +53,8 @@ pub(super) fn read(graph: &Graph) -> Result<Vec<Play>, String> {
     let (Some(features), Some(widths)) = (stored("memory.features"), stored("memory.half_widths")) else { return Ok(Vec::new()) };
     let widths = super::floats(widths)?;
     let features: Vec<i64> = features.raw_data.as_chunks::<8>().0.iter().map(|eight| i64::from_le_bytes(*eight)).collect();
-    if features.len() != widths.len() || graph.node.len() < NODES {
+    let operators = graph.node.iter().take(NODES).map(|node| node.op_type.as_str());
+    if features.len() != widths.len() || !operators.eq(["Gather", "Sub", "Add", "Max", "Min", "Where", "Sub", "Concat"]) {
         return Err("has a memory that ravenpose did not write".to_owned());
     }
     let play = |(feature, half_width): (i64, f32)| match usize::try_from(feature) {

@@ -106,7 +106,8 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
         let activation = ACTIVATIONS.into_iter().find(|one| one.operator().is_some_and(|operator| next(operator).is_some()));
         layers.push(Dense { weight, bias, activation: activation.unwrap_or(Activation::Identity) });
     }
-    if nodes.next().is_some() || layers.is_empty() || scale.len() != shift.len() {
+    let fits = plays.is_empty() || shift.len() == ravenpose_wire::FEATURES + plays.len();
+    if nodes.next().is_some() || layers.is_empty() || scale.len() != shift.len() || !fits {
         return Err("is not a chain that ravenpose wrote".to_owned());
     }
     let metadata = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
@@ -128,18 +129,31 @@ mod tests {
     use ravenpose::memory::Play;
 
     fn chain() -> Chain {
+        of_width(4)
+    }
+
+    fn of_width(inputs: usize) -> Chain {
         let layer = |rows: usize, columns: usize, activation| Dense {
             weight: Array2::from_shape_fn((rows, columns), |(r, c)| (r * 7 + c) as f32 * 0.01 - 0.1),
             bias: vec![0.25; rows],
             activation,
         };
-        let layers = vec![layer(5, 4, Activation::Tanh), layer(6, 5, Activation::Elu), layer(3, 6, Activation::Identity)];
-        Chain { shift: vec![1.0; 4], scale: vec![0.5; 4], layers, plays: Vec::new() }
+        let layers = vec![layer(5, inputs, Activation::Tanh), layer(6, 5, Activation::Elu), layer(3, 6, Activation::Identity)];
+        Chain { shift: vec![1.0; inputs], scale: vec![0.5; inputs], layers, plays: Vec::new() }
     }
 
-    /// The same with a memory: two of its four inputs are places.
+    /// Of a RAVEN-II's features, with two places behind them.
     fn with_memory() -> Chain {
-        Chain { plays: vec![Play { input: 0, half_width: 0.25 }, Play { input: 1, half_width: 3.0 }], ..chain() }
+        let plays = vec![Play { input: 56, half_width: 0.25 }, Play { input: 57, half_width: 3.0 }];
+        Chain { plays, ..of_width(ravenpose_wire::FEATURES + 2) }
+    }
+
+    #[test]
+    fn a_memory_that_does_not_fit_the_layers_is_refused() {
+        let bytes = write(&Chain { shift: vec![0.0; 119], ..with_memory() }, &BTreeMap::new());
+        assert!(read(&bytes).is_err());
+        let bytes = write(&Chain { plays: vec![Play { input: 118, half_width: 1.0 }; 2], ..with_memory() }, &BTreeMap::new());
+        assert!(read(&bytes).expect_err("beyond the features").contains("on feature 118"));
     }
 
     #[test]
