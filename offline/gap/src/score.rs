@@ -270,10 +270,11 @@ impl<'a> Scorer<'a> {
 /// Are the coefficients of a candidate, the last ones of a fit, what they may be?
 pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
     let own = &fit.coefficients[fit.coefficients.len() - candidate.columns.len()..];
-    own.iter().zip(&candidate.family.bounds).all(|(x, bound)| match bound {
+    own.iter().zip(&candidate.family.bounds).enumerate().all(|(k, (x, bound))| match bound {
         Bound::Free => true,
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
+        Bound::UpTo(times) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * own[before]),
     })
 }
 

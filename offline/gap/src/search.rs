@@ -32,9 +32,10 @@ impl Default for Thresholds {
 
 /// Steps of the grid of windows in a run.
 const EDGES: usize = 12;
-/// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill; a little lateness, for the
-/// last of what a motion's middle leaves, and clocks do not change on the way.
-const ALWAYS: [&str; 2] = ["stribeck_friction", "measurement_delay"];
+/// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
+const ALWAYS: [&str; 1] = ["stribeck_friction"];
+/// What a delay in a window pays more than others, nats: a little lateness passes for the last of what a motion's middle leaves.
+const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach,
 const SEEN_OFTEN: f64 = 2.0;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
@@ -450,7 +451,9 @@ impl Search<'_, '_> {
 
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
-    candidate.family.penalty_nats + [0.0, 8.0, 20.0][candidate.edges().min(2)]
+    let edges = candidate.edges().min(2);
+    let late = edges > 0 && candidate.family.physics == "measurement_delay";
+    candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
 }
 
 /// A claim that holds another one and more, and the share of its score by which it has to be better.

@@ -36,6 +36,35 @@ fn dry_friction_is_named_at_its_joint_and_measured() {
 }
 
 #[test]
+fn friction_that_falls_with_speed_is_not_taken_for_plain_friction() {
+    let folder = Folder::new("stribeck");
+    let curve = [("f_c", 0.36), ("f_s", 0.7), ("v_s", 0.19), ("a", 1.8)];
+    let (case, truth) = made(&folder, "stribeck", &[wanted("stribeck_friction", Some(1), &curve)], 12.0);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "stribeck_friction", truth[0].joint_name.as_ref().expect("a joint"));
+    near(first, "f_s", truth[0].effect.parameters["f_s"], 0.35);
+}
+
+#[test]
+fn a_tip_that_comes_late_from_the_middle_of_the_runs_on_is_seen() {
+    let folder = Folder::new("late");
+    let late = Wanted {
+        signal: Some("tip".to_owned()),
+        interval: Some([5.0, 120.0]),
+        ..wanted("measurement_delay", None, &[("d", 0.08)])
+    };
+    let (case, _) = made(&folder, "late", &[late], 12.0);
+    let report = case.judged(&folder.file("out"));
+    let verdicts = primary(&report);
+    assert_eq!(
+        verdicts.first().map(|verdict| verdict.physics.to_string()).as_deref(),
+        Some("measurement_delay"),
+        "{}",
+        report.summary
+    );
+}
+
+#[test]
 fn a_simulation_of_our_own_with_the_noise_of_a_robot_is_taken_for_a_simulation() {
     let folder = Folder::new("own");
     let loose = folder.write("loose.toml", with_effect("physics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }"));

@@ -16,6 +16,9 @@ const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
 /// Exponents of the Stribeck curve.
 const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
+/// Most that friction at rest exceeds sliding friction by, in terms of it: twice the vocabulary's range (f_s/f_c up to 2.5). A bristle's
+/// curve at no speed at all fits the noise of standstills otherwise.
+const STATIC_EXCESS: f64 = 3.0;
 /// First guess of the time in which a bristle settles, s.
 const SETTLING_S: [f64; 1] = [0.004];
 /// Time constants of heating, s.
@@ -114,6 +117,23 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
         )
         .penalised(3.0),
     );
+    // The same on bristles: else plain friction that rounds better would pass for it.
+    all.push(
+        Family::shaped(
+            "stribeck_friction",
+            &[j],
+            form,
+            TORQUE,
+            &[Bound::Positive, Bound::UpTo(STATIC_EXCESS)],
+            &[("v_s", true), ("a", true), ("presliding", true), ("settling", true)],
+            product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]),
+            move |d, s| {
+                let (sign, extra) = stribeck_turning(d, j, s);
+                vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)]
+            },
+        )
+        .penalised(3.0),
+    );
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.
@@ -146,6 +166,17 @@ fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<
         dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(curve).collect()
     });
     (sign_below(dictionary, j, &shape[2..]), extra)
+}
+
+/// The same of a sign that turns round over a presliding travel; shape `v_s`, `a`, that travel, settling.
+fn stribeck_turning(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let (travel, settling_s) = (shape[2].max(1e-12), shape[3]);
+    let extra = dictionary.smoothed(|r| {
+        let real = &dictionary.problem.pairs[r].real;
+        let curve = |v: &f64| (-(v.abs() / shape[0]).powf(shape[1])).exp();
+        real.bristle(j, travel, settling_s).iter().zip(&real.quick_velocity[j]).map(|(sign, v)| sign * curve(v)).collect()
+    });
+    (turning(dictionary, j, &shape[2..]), extra)
 }
 
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.

@@ -29,6 +29,8 @@ pub enum Bound {
     Positive,
     /// Within these.
     Between(f64, f64),
+    /// Positive, and at most so many times the coefficient before.
+    UpTo(f64),
 }
 
 /// Columns for a shape.
