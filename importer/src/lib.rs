@@ -57,10 +57,10 @@ pub fn import(bytes: &[u8], expected: &Expected) -> Result<Network, ImportError>
     let metadata = std::mem::take(&mut checked.metadata);
     let plays = std::mem::take(&mut checked.plays);
     let norms_input = !checked.input_norms.is_empty();
-    let expected = &Expected { inputs: expected.inputs + plays.len(), ..*expected };
+    let expected = checked.expected;
     guard::guarded(|| {
         let mut oracle = Oracle::load(&checked.proto, expected.inputs)?;
-        let links = chain::read(&tract::declutter(checked, expected.inputs)?, expected)?;
+        let links = chain::read(&tract::declutter(checked, expected.inputs)?, &expected)?;
         let mut folded = fold::fold(links, expected.inputs, metadata)?;
         folded.network.plays = plays;
         if norms_input {

@@ -28,9 +28,6 @@ const FEATURES: &str = "memory.features";
 const HALF_WIDTHS: &str = "memory.half_widths";
 const INPUTS: &str = "memory.inputs";
 
-/// What is drawn from other values; nothing else in the file may be called so.
-const OWN: [&str; 8] = ["memory.x", "memory.lower", "memory.upper", "memory.above", "memory.moved", OUT, "memory.places", INPUTS];
-
 /// Operator, inputs and output of each node; `@` stands for the graph's own input.
 const NODES: [(&str, &[&str], &str); 8] = [
     ("Gather", &["@", FEATURES], "memory.x"),
@@ -88,11 +85,10 @@ fn own_input(graph: &GraphProto) -> Result<String, ImportError> {
 fn check_nodes(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
     for (index, (operator, inputs, output)) in NODES.iter().enumerate() {
         let node = graph.node.get(index).ok_or_else(|| wrong(format!("only {index} nodes")))?;
-        let mut wanted = inputs.iter().map(|name| if *name == "@" { own } else { *name });
+        let wanted = inputs.iter().map(|name| if *name == "@" { own } else { *name });
         let same = node.op_type == *operator
             && node.domain.is_empty()
-            && node.input.len() == inputs.len()
-            && node.input.iter().all(|name| wanted.next() == Some(name))
+            && node.input.iter().map(String::as_str).eq(wanted)
             && node.output == [*output]
             && has_axis(node, matches!(*operator, "Gather" | "Concat"));
         if !same {
@@ -116,7 +112,7 @@ fn has_axis(node: &NodeProto, wanted: bool) -> bool {
 fn check_names(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
     let stored = graph.initializer.iter().map(|one| one.name.as_str());
     let later = graph.node.iter().skip(NODES.len()).flat_map(|node| &node.output).map(String::as_str);
-    match stored.chain(later).chain([own]).find(|name| OWN.contains(name)) {
+    match stored.chain(later).chain([own]).find(|name| NODES.iter().any(|(.., output)| output == name)) {
         Some(name) => Err(wrong(format!("{name} is defined twice"))),
         None => Ok(()),
     }
@@ -183,24 +179,19 @@ fn numbers<T, const BYTES: usize>(
     dims: &[usize],
     read: fn([u8; BYTES]) -> T,
 ) -> Result<Vec<T>, ImportError> {
-    let same_dims = tensor.dims.len() == dims.len() && tensor.dims.iter().zip(dims).all(|(a, b)| *a == *b as i64);
     let bytes: usize = dims.iter().product::<usize>() * BYTES;
-    let bare = TensorProto { doc_string: tensor.doc_string.clone(), ..plain(tensor) };
-    if tensor.data_type != data_type as i32 || !same_dims || tensor.raw_data.len() != bytes || bare != *tensor {
+    let wanted = TensorProto {
+        name: tensor.name.clone(),
+        dims: dims.iter().map(|size| *size as i64).collect(),
+        data_type: data_type as i32,
+        raw_data: tensor.raw_data.clone(),
+        doc_string: tensor.doc_string.clone(),
+        ..TensorProto::default()
+    };
+    if tensor.raw_data.len() != bytes || wanted != *tensor {
         return Err(wrong(format!("{} is not {} {dims:?} as raw data", tensor.name, data_type.as_str_name())));
     }
     Ok(tensor.raw_data.as_chunks::<BYTES>().0.iter().map(|chunk| read(*chunk)).collect())
-}
-
-/// What such a tensor may state.
-fn plain(tensor: &TensorProto) -> TensorProto {
-    TensorProto {
-        name: tensor.name.clone(),
-        dims: tensor.dims.clone(),
-        data_type: tensor.data_type,
-        raw_data: tensor.raw_data.clone(),
-        ..TensorProto::default()
-    }
 }
 
 /// Gives the graph's input the name and the width of what the first layer sees; `false` if it was not `inputs` wide.

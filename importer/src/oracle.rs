@@ -25,7 +25,7 @@ impl Oracle {
     pub fn new(bytes: &[u8], expected: &Expected) -> Result<Self, ImportError> {
         drop(import(bytes, expected)?);
         let checked = check::check(bytes, expected)?;
-        guard::guarded(|| Self::load(&checked.proto, expected.inputs + checked.plays.len()))
+        guard::guarded(|| Self::load(&checked.proto, checked.expected.inputs))
     }
 
     /// Loads a checked model; the caller guards against tract's panics.

@@ -21,6 +21,8 @@ pub(crate) struct Checked {
     pub(crate) metadata: BTreeMap<String, String>,
     /// Of the memory that stood in front of what `proto` still has.
     pub(crate) plays: Vec<Play>,
+    /// Widths of what `proto` still has: a memory's places are inputs.
+    pub(crate) expected: Expected,
     /// Indices of batch normalisations that take the network's own input.
     pub(crate) input_norms: Vec<usize>,
 }
@@ -36,7 +38,7 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Import
     let expected = Expected { inputs: expected.inputs + plays.len(), ..*expected };
     let input = signature::check(graph, &expected)?;
     let input_norms = nodes::check(graph, input)?;
-    Ok(Checked { proto, metadata, plays, input_norms })
+    Ok(Checked { proto, metadata, plays, expected, input_norms })
 }
 
 fn decode(bytes: &[u8]) -> Result<ModelProto, ImportError> {

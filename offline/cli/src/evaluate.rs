@@ -98,12 +98,6 @@ fn words(report: &Report) -> String {
     if let Some(words) = trust.settled() {
         lines.push(format!("by run {words}"));
     }
-    for unsettled in &trust.unsettled {
-        let holds = unsettled.coverage.map_or("no bound stated".to_owned(), |share| format!("its own bound holds in {share:.1} %"));
-        lines.push(format!(
-            "memory {} to {} s old, not settled ({} rows): {:.3} RMS left, {holds}",
-            unsettled.age_s.0, unsettled.age_s.1, unsettled.rows, unsettled.rms
-        ));
-    }
+    lines.extend(trust.unsettled.iter().map(ToString::to_string));
     lines.join("\n") + "\n"
 }

@@ -7,8 +7,6 @@ use std::fs;
 use std::path::Path;
 
 const NAME: &str = "registration";
-/// A rotation's rows are orthonormal to this: six digits were kept.
-const ROTATION_TOLERANCE: f64 = 1e-4;
 
 /// The section; position in frame 0 = rotation · position in the world + translation.
 #[derive(Serialize, Deserialize)]
@@ -46,20 +44,14 @@ pub(crate) fn read(cameras: &Path) -> Result<Rigid, String> {
     let wrong = |what: String| format!("{name}: [{NAME}]: {what}; write it anew with `ravenpose pair --register`");
     let section: Section =
         section.clone().try_into().map_err(|error: toml::de::Error| wrong(error.message().replace('\n', " ")))?;
-    let rows = &section.rotation;
-    let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let cross = |a: &[f64; 3], b: &[f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let worst = (0..3)
-        .flat_map(|i| (0..3).map(move |j| (i, j)))
-        .map(|(i, j)| (dot(&rows[i], &rows[j]) - f64::from(u8::from(i == j))).abs());
-    // Written so that NaN fails.
-    if !(worst.fold(0.0, f64::max) <= ROTATION_TOLERANCE && dot(&cross(&rows[0], &rows[1]), &rows[2]) > 0.0) {
+    let rigid = Rigid { rotation: section.rotation, translation_m: section.translation_mm.map(|mm| mm * 1e-3) };
+    if !rigid.is_rotation() {
         return Err(wrong("rotation is no rotation".to_owned()));
     }
-    if section.translation_mm.iter().any(|value| !value.is_finite()) {
+    if rigid.translation_m.iter().any(|value| !value.is_finite()) {
         return Err(wrong("translation_mm is not finite".to_owned()));
     }
-    Ok(Rigid { rotation: section.rotation, translation_m: section.translation_mm.map(|mm| mm * 1e-3) })
+    Ok(rigid)
 }
 
 /// Writes it into the file, in place of an earlier one; everything else stays as it is.

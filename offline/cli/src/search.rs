@@ -1,7 +1,7 @@
 //! `ravenpose search`: random recipes, the better third trained longer, and again.
 
 use crate::output;
-use crate::train::Source;
+use crate::train::{self, Source};
 use ::training::preset::Recipe;
 use ::training::search::{self, BEST, TRIALS, Trial};
 use clap::Args;
@@ -30,7 +30,7 @@ pub(crate) struct Wish {
     #[arg(long, default_value_t = 4)]
     every: usize,
     /// Recipe that says whether there is a memory, and how many epochs the best one is to be trained for
-    #[arg(long, default_value = "default", value_parser = ["default", "one-state", "paper", "paper-code"])]
+    #[arg(long, default_value = "default", value_parser = Recipe::PRESETS)]
     preset: String,
     /// Everything random: recipes, split, weights, order of rows
     #[arg(long, default_value_t = 0)]
@@ -43,7 +43,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
             return Err(format!("{name} 0: must be 1 or more"));
         }
     }
-    let mut base = Recipe::preset(&wish.preset).ok_or_else(|| format!("--preset {}: no such recipe", wish.preset))?;
+    let mut base = train::preset(&wish.preset)?;
     base.seed = wish.seed;
     if wish.source.is_table() {
         base = base.for_tables();

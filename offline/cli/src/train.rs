@@ -2,7 +2,7 @@
 
 use crate::output;
 use ::training::commands::{self, Done, Event};
-use ::training::data::{Columns, Reading, memory};
+use ::training::data::{Columns, Reading};
 use ::training::preset::Recipe;
 use clap::Args;
 use std::io::IsTerminal;
@@ -18,7 +18,7 @@ pub(crate) struct Wish {
     #[arg(long)]
     out: PathBuf,
     /// Recipe
-    #[arg(long, default_value = "default", value_parser = ["default", "one-state", "paper", "paper-code"])]
+    #[arg(long, default_value = "default", value_parser = Recipe::PRESETS)]
     preset: String,
     /// Recipe in a file: best.json of `ravenpose search`
     #[arg(long, conflicts_with = "preset", value_name = "FILE")]
@@ -70,7 +70,7 @@ impl Source {
             truth_hz: self.truth_hz,
             truth_noise_mm: self.truth_noise,
             seed: recipe.seed,
-            plays: if recipe.memory { memory::plays() } else { Vec::new() },
+            plays: recipe.plays(),
             arm: usize::from(self.arm == "green"),
             columns: self.columns.columns(),
         })
@@ -107,7 +107,7 @@ impl Named {
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let mut recipe = match &wish.recipe {
-        None => Recipe::preset(&wish.preset).ok_or_else(|| format!("--preset {}: no such recipe", wish.preset))?,
+        None => preset(&wish.preset)?,
         Some(file) => recipe(file)?,
     };
     recipe.seed = wish.seed;
@@ -129,6 +129,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     }
     let _ = output::say(format_args!("{}", words(wish, &done)));
     Ok(ExitCode::SUCCESS)
+}
+
+pub(crate) fn preset(name: &str) -> Result<Recipe, String> {
+    Recipe::preset(name).ok_or_else(|| format!("--preset {name}: no such recipe"))
 }
 
 fn recipe(file: &Path) -> Result<Recipe, String> {

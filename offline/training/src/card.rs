@@ -74,17 +74,14 @@ pub fn bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec
         .collect()
 }
 
-/// The same while a memory has not settled: the widest over its ages, and no narrower than that of a settled one. NaN where no memory
-/// was unsettled.
-fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec<f64> {
+/// The same while a memory has not settled: the widest over its ages, and no narrower than `settled`, that of one that has. None where
+/// no memory was unsettled.
+fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64, settled: &[f64]) -> Option<Vec<f64>> {
     let of_age =
         |age_s| bounds(chain, &validation.iter().map(|one: &Trajectory| one.unsettled(age_s)).collect::<Vec<_>>(), truth_noise);
     let ages: Vec<Vec<f64>> = AGES_S.iter().map(of_age).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())).collect();
-    if ages.is_empty() {
-        return vec![f64::NAN; chain.outputs()];
-    }
-    let settled = bounds(chain, validation, truth_noise);
-    ages.iter().fold(settled, |widest, bounds| widest.iter().zip(bounds).map(|(a, b)| a.max(*b)).collect())
+    let wider = |widest: Vec<f64>, bounds: &Vec<f64>| widest.iter().zip(bounds).map(|(a, b)| a.max(*b)).collect();
+    (!ages.is_empty()).then(|| ages.iter().fold(settled.to_vec(), wider))
 }
 
 /// The smallest value with at least this share of the weight at or below it.
@@ -106,15 +103,13 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
     let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
     let is_raven = facts.is_raven;
+    let settled = bounds(facts.chain, facts.validation, facts.truth_noise_mm);
     put("trained_on", facts.trained_on.to_owned());
     if is_raven {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
-        if !facts.chain.plays.is_empty() {
-            let bounds = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm);
-            if bounds.iter().all(|bound| bound.is_finite()) {
-                put("bound95_unsettled_mm", words(&bounds));
-            }
+        if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm, &settled) {
+            put("bound95_unsettled_mm", words(&wider));
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
             facts
@@ -134,7 +129,7 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     put("domain_center", words(&center[..stated]));
     put("domain_weight", words(&weight[..stated]));
     put("domain_limit", limit.to_string());
-    put("bound95_mm", words(&bounds(facts.chain, facts.validation, facts.truth_noise_mm)));
+    put("bound95_mm", words(&settled));
     put("golden", golden(facts));
     card
 }

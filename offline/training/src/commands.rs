@@ -66,14 +66,10 @@ pub struct Done {
 /// # Errors
 /// [`TrainingError`]: data, checkpoint, or files that cannot be written.
 pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
-    let mut set = data::read(wish.data, wish.reading, &mut |done, all| told(&Event::Read(done, all)))?;
-    refuse_twins(&set)?;
-    let split = Split::draw(set.trajectories.len(), wish.recipe.seed)?;
-    let all_rows: Vec<usize> = set.trajectories.iter().map(Trajectory::rows).collect();
-    let count = |part: &[usize]| part.iter().map(|index| all_rows[*index]).sum();
-    let rows = [count(&split.train), count(&split.validation), count(&split.test)];
-    let trajectories = [split.train.len(), split.validation.len(), split.test.len()];
-    let mut parts = Parts::of(&mut set, &split);
+    let (set, mut parts) = read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
+    let count = |part: &[Trajectory]| part.iter().map(Trajectory::rows).sum();
+    let rows = [count(&parts.train), count(&parts.validation), parts.test.rows()];
+    let trajectories = [parts.train.len(), parts.validation.len(), parts.test.names().len()];
     parts.train.iter_mut().for_each(|one| one.make_young(YOUNG_EVERY));
     let checkpoint = beside(wish.out, "checkpoint");
     let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
@@ -109,8 +105,25 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     })
 }
 
+/// Reads recordings and deals whole trajectories out; what they have in common stays behind.
+///
+/// # Errors
+/// [`TrainingError`]: a recording that cannot be read, the same run twice, too few of them.
+pub(crate) fn read_parts(
+    files: &[PathBuf],
+    reading: &Reading,
+    seed: u64,
+    told: &mut dyn FnMut(usize, usize),
+) -> Result<(DataSet, Parts), TrainingError> {
+    let mut set = data::read(files, reading, told)?;
+    refuse_twins(&set)?;
+    let split = Split::draw(set.trajectories.len(), seed)?;
+    let parts = Parts::of(&mut set, &split);
+    Ok((set, parts))
+}
+
 /// The same run given twice would be in two sets.
-pub(crate) fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
+fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
     let mut seen = BTreeMap::new();
     for one in &set.trajectories {
         if let Some(other) = seen.insert(one.id(), &one.name) {

@@ -1,7 +1,9 @@
 //! Recipes: the paper's, that of its published code, and the one that does best here.
 
+use crate::data::memory;
 use crate::network::{Activation, NormPlace};
 use crate::prepare::Preparation;
+use ravenpose::memory::Play;
 use serde::{Deserialize, Serialize};
 
 /// How the learning rate goes.
@@ -48,6 +50,9 @@ pub struct Recipe {
 }
 
 impl Recipe {
+    /// Names of the presets, the best first.
+    pub const PRESETS: [&str; 4] = ["default", "one-state", "paper", "paper-code"];
+
     /// A preset by its name.
     pub fn preset(name: &str) -> Option<Self> {
         match name {
@@ -89,6 +94,11 @@ impl Recipe {
             norm: NormPlace::After,
             ..Self::paper()
         }
+    }
+
+    /// The memory that it wants.
+    pub fn plays(&self) -> Vec<Play> {
+        if self.memory { memory::plays() } else { Vec::new() }
     }
 
     /// The same for tables, whose columns nobody knows: every one of them standardised. The default's network becomes one for

@@ -1,14 +1,14 @@
 //! `ravenpose search`: random recipes, the better third of which is trained longer, and again (successive halving, Jamieson and
 //! Talwalkar 2016, by thirds). Every finished training is a line of `trials.jsonl`, from which a stopped search goes on.
 
-use crate::commands::{YOUNG_EVERY, refuse_twins, write_whole};
-use crate::data::{self, Reading, Trajectory};
+use crate::commands::{YOUNG_EVERY, read_parts, write_whole};
+use crate::data::{Reading, Trajectory};
 use crate::error::{TrainingError, hex, shown};
 use crate::network::{Activation, NormPlace};
 use crate::prepare::Preparation;
 use crate::preset::{Recipe, Schedule};
 use crate::random::Random;
-use crate::split::{Parts, Split};
+use crate::split::Parts;
 use crate::train;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -89,20 +89,19 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
     let (rate, decay, l1) = (log(3e-4, 1e-2), log(1e-2, 1.0), log(1e-7, 1e-5));
     let layers = 1 + random.below(4);
     let hidden = (0..layers).map(|_| 100 + 50 * random.below(11)).collect();
-    let pick = |random: &mut Random, n: usize| random.below(n);
     Recipe {
         name: format!("search-{index}"),
         hidden,
-        activation: [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu][pick(&mut random, 4)],
-        norm: [NormPlace::None, NormPlace::Before, NormPlace::After][pick(&mut random, 3)],
-        preparation: [Preparation::Physical, Preparation::Standard][pick(&mut random, 2)],
+        activation: [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu][random.below(4)],
+        norm: [NormPlace::None, NormPlace::Before, NormPlace::After][random.below(3)],
+        preparation: [Preparation::Physical, Preparation::Standard][random.below(2)],
         memory: base.memory,
-        batch: 128 << pick(&mut random, 4),
+        batch: 128 << random.below(4),
         rate,
-        schedule: [Schedule::Constant, Schedule::Cosine][pick(&mut random, 2)],
+        schedule: [Schedule::Constant, Schedule::Cosine][random.below(2)],
         epochs: base.epochs,
-        l1: if pick(&mut random, 2) == 0 { 0.0 } else { l1 },
-        decay: if pick(&mut random, 2) == 0 { 0.0 } else { decay },
+        l1: if random.below(2) == 0 { 0.0 } else { l1 },
+        decay: if random.below(2) == 0 { 0.0 } else { decay },
         patience: base.epochs,
         seed: base.seed,
     }
@@ -114,11 +113,8 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
 /// # Errors
 /// [`TrainingError`]: data, a folder that cannot be written or holds another search.
 pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Trial>, TrainingError> {
-    let mut set = data::read(wish.data, wish.reading, &mut |_, _| {})?;
-    refuse_twins(&set)?;
+    let (set, Parts { mut train, mut validation, .. }) = read_parts(wish.data, wish.reading, wish.base.seed, &mut |_, _| {})?;
     let outputs = set.outputs();
-    let split = Split::draw(set.trajectories.len(), wish.base.seed)?;
-    let Parts { mut train, mut validation, .. } = Parts::of(&mut set, &split);
     for one in train.iter_mut().chain(&mut validation) {
         one.thin(wish.every);
     }

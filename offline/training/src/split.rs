@@ -54,6 +54,11 @@ impl Sealed {
         self.trajectories.iter().map(|one| one.name.clone()).collect()
     }
 
+    /// Rows of all of them.
+    pub fn rows(&self) -> usize {
+        self.trajectories.iter().map(Trajectory::rows).sum()
+    }
+
     /// Gives them out.
     pub fn open(self) -> Vec<Trajectory> {
         self.trajectories

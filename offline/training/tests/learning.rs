@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Folder, plays, runs, small};
+use common::{Folder, runs, small};
 use training::commands::{self, Event, Model, Wish};
 use training::data::{self, Reading};
 use training::evaluate;
@@ -60,7 +60,7 @@ fn the_card_says_what_the_service_wants_and_which_runs_it_has_seen() {
     let files = runs(&folder, 4, 3.0, ".mcap");
     for preset in ["default", "one-state"] {
         let (out, recipe) = (folder.file("model.onnx"), small(preset));
-        let reading = Reading { truth_noise_mm: 0.5, plays: plays(&recipe), ..Reading::default() };
+        let reading = Reading { truth_noise_mm: 0.5, plays: recipe.plays(), ..Reading::default() };
         let done =
             commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
         assert_eq!(done.trajectories, [2, 1, 1]);

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Folder, plays, runs, small};
+use common::{Folder, runs, small};
 use ravenpose::config::ModelSource;
 use ravenpose::cycle::Estimator;
 use ravenpose::network::Format;
@@ -18,7 +18,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
     let folder = Folder::new("service");
     let files = runs(&folder, 3, 4.0, ".mcap");
     let (out, recipe) = (folder.file("model.onnx"), small("default"));
-    let reading = Reading { plays: plays(&recipe), truth_hz: 1000.0, ..Reading::default() };
+    let reading = Reading { plays: recipe.plays(), truth_hz: 1000.0, ..Reading::default() };
     commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
     let set = data::read(&files[..1], &reading, &mut |_, _| {}).expect("run");
     let expected = Model::read(&out).expect("model").chain.estimate(&set.trajectories[0].inputs);
@@ -58,7 +58,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
 fn rows_with_a_young_memory_are_those_of_a_run_that_began_then() {
     let folder = Folder::new("young");
     let files = runs(&folder, 1, 6.0, ".mcap");
-    let reading = Reading { plays: plays(&small("default")), truth_hz: 1000.0, ..Reading::default() };
+    let reading = Reading { plays: small("default").plays(), truth_hz: 1000.0, ..Reading::default() };
     let one = &data::read(&files, &reading, &mut |_, _| {}).expect("run").trajectories[0];
     let unsettled = one.unsettled(&(0.0..8.0));
     assert!(unsettled.rows() > 500 && unsettled.rows() <= one.rows(), "{} of {}", unsettled.rows(), one.rows());

@@ -6,7 +6,7 @@
 
 mod common;
 
-use common::{Folder, plays, python, runs, small};
+use common::{Folder, python, runs, small};
 use std::process::Command;
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading};
@@ -46,7 +46,7 @@ fn onnx_runtime_gives_what_the_card_says() {
     for preset in ["default", "one-state", "paper", "paper-code"] {
         let (out, recipe) = (folder.file("model.onnx"), small(preset));
         // Every state has a truth in these runs, so that a memory fed with the rows has seen all of them.
-        let reading = Reading { plays: plays(&recipe), truth_hz: 1000.0, ..Reading::default() };
+        let reading = Reading { plays: recipe.plays(), truth_hz: 1000.0, ..Reading::default() };
         commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
         let chain = Model::read(&out).expect("model").chain;
         let set = data::read(&files, &reading, &mut |_, _| {}).expect("runs");

@@ -7,8 +7,8 @@ use crate::problem::Channel;
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
-/// A sign of the motion with the numbers that round it.
-type Turn = fn(&Dictionary, usize, &[f64]) -> Vec<f64>;
+/// A sign of the motion in one run with the numbers that round it, at every row.
+type Turn = fn(&Dictionary, usize, usize, &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
@@ -53,15 +53,15 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     };
     let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
-    let by_speed = (&[("v_eps", true)][..], product(&[&slowest]), sign_below as Turn);
-    let by_travel = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), turning as Turn);
-    for (names, starts, sign) in [by_speed, by_travel] {
+    let speeds = (&[("v_eps", true)][..], product(&[&slowest]), by_speed as Turn);
+    let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), by_travel as Turn);
+    for (names, starts, sign) in [speeds, bristles] {
         all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
-            vec![d.effort_of(j, sign(d, j, s), at_link)]
+            vec![d.effort_of(j, smooth(d, j, s, sign), at_link)]
         }));
         all.push(
             Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
-                vec![by_load(d, &sign(d, j, s))]
+                vec![by_load(d, &smooth(d, j, s, sign))]
             })
             .penalised(1.0),
         );
@@ -75,7 +75,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                 names,
                 starts.clone(),
                 move |d, s| {
-                    let sign = sign(d, j, s);
+                    let sign = smooth(d, j, s, sign);
                     vec![by_load(d, &sign), d.effort_of(j, sign, at_link)]
                 },
             )
@@ -91,7 +91,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     &[Bound::Free],
                     &[&[("T", true)], names].concat(),
                     HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t], &s[..]].concat())).collect(),
-                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &sign(d, j, &s[1..])), false)],
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &smooth(d, j, &s[1..], sign)), false)],
                 )
                 .penalised(2.0),
             );
@@ -101,39 +101,20 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
         vec![d.effort_of(j, velocity(d), at_link)]
     }));
     let slow = STRIBECK_SPEED.map(|share| share * speed);
-    all.push(
-        Family::shaped(
-            "stribeck_friction",
-            &[j],
-            form,
-            TORQUE,
-            &[Bound::Positive, Bound::Positive],
-            &[("v_s", true), ("a", true), ("v_eps", true)],
-            product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]),
-            move |d, s| {
-                let (sign, extra) = stribeck(d, j, s);
-                vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)]
-            },
-        )
-        .penalised(3.0),
-    );
-    // The same on bristles: else plain friction that rounds better would pass for it.
-    all.push(
-        Family::shaped(
-            "stribeck_friction",
-            &[j],
-            form,
-            TORQUE,
-            &[Bound::Positive, Bound::UpTo(STATIC_EXCESS)],
-            &[("v_s", true), ("a", true), ("presliding", true), ("settling", true)],
-            product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]),
-            move |d, s| {
-                let (sign, extra) = stribeck_turning(d, j, s);
-                vec![d.effort_of(j, sign, at_link), d.effort_of(j, extra, at_link)]
-            },
-        )
-        .penalised(3.0),
-    );
+    // On bristles too: else plain friction that rounds better would pass for it.
+    let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), positive, by_speed as Turn);
+    let starts = product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]);
+    let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, Bound::UpTo(STATIC_EXCESS), by_travel as Turn);
+    for (names, starts, excess, sign) in [speeds, bristles] {
+        let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
+        all.push(
+            Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {
+                let extra = d.smoothed(|r| stribeck(d, r, j, s, sign));
+                vec![d.effort_of(j, smooth(d, j, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
+            })
+            .penalised(3.0),
+        );
+    }
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.
@@ -142,41 +123,32 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
-/// Sign of the motion, turning round over a presliding travel, smoothed; shape: that travel, and the time in which the vibration
-/// of such bristles settles (LuGre: `z + t zd`).
-fn turning(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
-    let (travel, settling_s) = (shape[0].max(1e-12), shape[1]);
-    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.bristle(j, travel, settling_s))
+fn smooth(dictionary: &Dictionary, j: usize, shape: &[f64], sign: Turn) -> Vec<f64> {
+    dictionary.smoothed(|r| sign(dictionary, r, j, shape))
+}
+
+/// Turning round over a presliding travel; shape: that travel, and the time in which the vibration of such bristles settles
+/// (LuGre: `z + t zd`).
+fn by_travel(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64]) -> Vec<f64> {
+    dictionary.problem.pairs[run].real.bristle(j, shape[0].max(1e-12), shape[1])
+}
+
+/// Turning over a speed, the shape.
+fn by_speed(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64]) -> Vec<f64> {
+    dictionary.problem.pairs[run].real.quick_velocity[j].iter().map(|v| (v / shape[0]).tanh()).collect()
 }
 
 /// Sign of the velocity as steep as its noise allows, smoothed.
 pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
-    sign_below(dictionary, j, &[dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max)])
+    let speed = dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max);
+    smooth(dictionary, j, &[speed], by_speed)
 }
 
-/// Sign of the velocity, turning over `v_eps`, smoothed.
-fn sign_below(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
-    dictionary.smoothed(|r| dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(|v| (v / shape[0]).tanh()).collect())
-}
-
-/// The sign of the velocity, and what the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, `v_eps`.
-fn stribeck(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let extra = dictionary.smoothed(|r| {
-        let curve = |v: &f64| (v / shape[2]).tanh() * (-(v.abs() / shape[0]).powf(shape[1])).exp();
-        dictionary.problem.pairs[r].real.quick_velocity[j].iter().map(curve).collect()
-    });
-    (sign_below(dictionary, j, &shape[2..]), extra)
-}
-
-/// The same of a sign that turns round over a presliding travel; shape `v_s`, `a`, that travel, settling.
-fn stribeck_turning(dictionary: &Dictionary, j: usize, shape: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let (travel, settling_s) = (shape[2].max(1e-12), shape[3]);
-    let extra = dictionary.smoothed(|r| {
-        let real = &dictionary.problem.pairs[r].real;
-        let curve = |v: &f64| (-(v.abs() / shape[0]).powf(shape[1])).exp();
-        real.bristle(j, travel, settling_s).iter().zip(&real.quick_velocity[j]).map(|(sign, v)| sign * curve(v)).collect()
-    });
-    (turning(dictionary, j, &shape[2..]), extra)
+/// What the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, and that of the sign.
+fn stribeck(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64], sign: Turn) -> Vec<f64> {
+    let speeds = &dictionary.problem.pairs[run].real.quick_velocity[j];
+    let signs = sign(dictionary, run, j, &shape[2..]);
+    signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.

@@ -16,6 +16,8 @@ pub struct Rigid {
     pub translation_m: [f64; 3],
 }
 
+const ROTATION_TOLERANCE: f64 = 1e-4;
+
 impl Rigid {
     /// The truth is in frame 0 already.
     pub const IDENTITY: Self = Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation_m: [0.0; 3] };
@@ -23,6 +25,13 @@ impl Rigid {
     /// Brings a position, m, into frame 0.
     pub fn apply(&self, position_m: [f64; 3]) -> [f64; 3] {
         (self.matrix() * Vector3::from(position_m) + Vector3::from(self.translation_m)).into()
+    }
+
+    /// Is the matrix proper and orthonormal, to what four or more kept digits leave? Not if anything in it is no number.
+    pub fn is_rotation(&self) -> bool {
+        let matrix = self.matrix();
+        let off = matrix * matrix.transpose() - Matrix3::identity();
+        off.iter().all(|part| part.abs() <= ROTATION_TOLERANCE) && matrix.determinant() > 0.0
     }
 
     pub(super) fn matrix(&self) -> Matrix3<f64> {

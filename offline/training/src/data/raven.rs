@@ -107,10 +107,13 @@ impl<'a> Pairing<'a> {
         self.state_ns = stamp_ns;
         features::extract(&state, self.side.index(), &mut self.features);
         // As the service does it: what cannot be the robot's is not followed.
-        if !may_follow_recorded(&self.possible, &self.features) {
-            self.state = Some(state);
-            return;
+        if may_follow_recorded(&self.possible, &self.features) {
+            self.follow(stamp_ns);
         }
+        self.state = Some(state);
+    }
+
+    fn follow(&mut self, stamp_ns: i64) {
         let begun_ns = *self.begun_ns.get_or_insert(stamp_ns);
         self.memory.follow(&self.features, stamp_ns);
         if !self.memory.is_empty() && self.found.settled_after_s.is_none() && self.memory.is_settled() {
@@ -123,7 +126,6 @@ impl<'a> Pairing<'a> {
             self.young_begun += 1;
         }
         self.young.follow(&self.features, stamp_ns);
-        self.state = Some(state);
     }
 
     fn truth(&mut self, truth: &Truth) -> Result<(), TrainingError> {

@@ -93,6 +93,17 @@ impl Trust {
     }
 }
 
+impl std::fmt::Display for Unsettled {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ((from, to), rows, rms) = (self.age_s, self.rows, self.rms);
+        write!(f, "memory {from} to {to} s old, not settled ({rows} rows): {rms:.3} RMS left, ")?;
+        match self.coverage {
+            Some(share) => write!(f, "its own bound holds in {share:.1} %"),
+            None => f.write_str("no bound stated"),
+        }
+    }
+}
+
 /// What a model with a memory is good for soon after its start.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Unsettled {
@@ -100,7 +111,6 @@ pub struct Unsettled {
     pub age_s: (f64, f64),
     /// Rows in which it had not settled.
     pub rows: usize,
-
     /// RMS of the vector that is left of them, against the truth without added noise.
     pub rms: f64,
     /// Share of those rows within the stated bound over all axes, percent; none where none is stated.

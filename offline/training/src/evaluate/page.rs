@@ -130,13 +130,7 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
     if let Some(words) = trust.settled() {
         lines.push(format!("By run {words}."));
     }
-    for unsettled in &trust.unsettled {
-        let holds = unsettled.coverage.map_or("no bound is stated".to_owned(), |share| format!("that bound holds in {share:.1} %"));
-        lines.push(format!(
-            "Memory {} to {} s old and not settled ({} rows): {:.3} {unit} RMS left; {holds}.",
-            unsettled.age_s.0, unsettled.age_s.1, unsettled.rows, unsettled.rms
-        ));
-    }
+    lines.extend(trust.unsettled.iter().map(|unsettled| format!("By age, {unit}: {unsettled}.")));
     if !trust.leaving.is_empty() {
         let names: Vec<String> = trust.leaving.iter().map(|(name, share)| format!("{name} ({share:.2} %)")).collect();
         lines.push(format!("Inputs that leave their range most often: {}.", names.join(", ")));

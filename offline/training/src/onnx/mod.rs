@@ -23,6 +23,8 @@ const ACTIVATIONS: [Activation; 4] = [Activation::Sigmoid, Activation::Tanh, Act
 /// The bytes of an ONNX file; properties in the order of their keys, so that the same model gives the same bytes.
 pub fn write(chain: &Chain, metadata: &BTreeMap<String, String>) -> Vec<u8> {
     let mut graph = Graph { name: "ravenpose".to_owned(), ..Graph::default() };
+    graph.input.push(value(INPUT, FLOAT, chain.inputs() - chain.plays.len()));
+    graph.output.push(value(OUTPUT, FLOAT, chain.outputs()));
     let mut current = if chain.plays.is_empty() { INPUT.to_owned() } else { memory::write(&mut graph, &chain.plays) };
     for (operator, name, values) in [("Sub", "shift", &chain.shift), ("Mul", "scale", &chain.scale)] {
         graph.initializer.push(tensor(name, &[values.len()], values.iter()));
@@ -46,8 +48,6 @@ pub fn write(chain: &Chain, metadata: &BTreeMap<String, String>) -> Vec<u8> {
             current = out;
         }
     }
-    graph.input.insert(0, value(INPUT, FLOAT, chain.inputs() - chain.plays.len()));
-    graph.output.insert(0, value(OUTPUT, FLOAT, chain.outputs()));
     let model = Model {
         ir_version: IR_VERSION,
         producer_name: "ravenpose".to_owned(),

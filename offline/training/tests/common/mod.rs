@@ -4,11 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use arm::Side;
-use ravenpose::memory::Play;
 use recordings::save::{self, StateFormat};
 use simulator::Robot;
 use simulator::production::{Motion, Plan, Player};
-use training::data::memory;
 use training::preset::Recipe;
 
 /// A folder of our own, gone at the end.
@@ -66,11 +64,6 @@ pub(crate) fn runs(folder: &Folder, count: usize, seconds: f64, ending: &str) ->
 /// A recipe that takes a second.
 pub(crate) fn small(preset: &str) -> Recipe {
     Recipe { hidden: vec![16, 12], epochs: 4, ..Recipe::preset(preset).expect("preset") }
-}
-
-/// The memory that a recipe wants.
-pub(crate) fn plays(recipe: &Recipe) -> Vec<Play> {
-    if recipe.memory { memory::plays() } else { Vec::new() }
 }
 
 pub(crate) fn python() -> Option<PathBuf> {
