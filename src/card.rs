@@ -1,6 +1,7 @@
 //! The model card: ONNX metadata that says what a network may be used for. `docs/models.md` describes every property.
 
 use crate::guard::Domain;
+use crate::load::{self, LoadCard};
 use ravenpose_wire::{FEATURES, features};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -63,6 +64,8 @@ pub struct Card {
     pub bound95_mm: [f64; 3],
     /// The same while the model's memory is not settled, mm; NaN if none is stated.
     pub bound95_unsettled_mm: [f64; 3],
+    /// What torque says about load; none if the model does not watch it.
+    pub load: Option<LoadCard>,
     /// Golden pairs.
     pub golden: Vec<Golden>,
 }
@@ -108,24 +111,31 @@ impl Card {
         };
         let bound95_mm = half_widths("ravenpose.bound95_mm")?;
         let bound95_unsettled_mm = half_widths("ravenpose.bound95_unsettled_mm")?;
+        let load = load(metadata)?;
         let golden = golden(get("ravenpose.golden").unwrap_or(""))?;
         if golden.is_empty() && !untrained {
             return Err(CardError::Missing { key: "ravenpose.golden" });
         }
-        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, bound95_unsettled_mm, golden })
+        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, bound95_unsettled_mm, load, golden })
     }
 
-    /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one.
+    /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one; what watches the
+    /// load looks at as many places as the memory has.
     ///
     /// # Errors
     /// [`CardError::Numbers`].
-    pub fn check_memory(&self, has_memory: bool) -> Result<(), CardError> {
+    pub fn check_memory(&self, plays: usize) -> Result<(), CardError> {
+        let expected = load::expected_len(plays);
+        if let Some(row) = self.load.iter().flat_map(|load| &load.expected).find(|row| row.len() != expected) {
+            let problem = format!("{} numbers per motor, expected {expected} for {plays} plays", row.len());
+            return Err(CardError::Numbers { key: LOAD[0], problem });
+        }
         let wrong = |problem: &str| Err(CardError::Numbers { key: "ravenpose.bound95_unsettled_mm", problem: problem.to_owned() });
         let stated = self.bound95_unsettled_mm.iter().all(|bound| bound.is_finite());
         if self.bound95_unsettled_mm.iter().zip(self.bound95_mm).any(|(unsettled, settled)| *unsettled < settled) {
             return wrong("is narrower than ravenpose.bound95_mm");
         }
-        if stated && !has_memory {
+        if stated && plays == 0 {
             return wrong("the network has no memory");
         }
         Ok(())
@@ -181,6 +191,47 @@ fn domain(metadata: &BTreeMap<String, String>, untrained: bool) -> Result<Option
     Ok(Some(domain))
 }
 
+/// Keys of [`LoadCard`], in its order.
+const LOAD: [&str; 6] = [
+    "ravenpose.load_expected",
+    "ravenpose.load_pull",
+    "ravenpose.load_weight",
+    "ravenpose.load_travel_deg",
+    "ravenpose.load_information",
+    "ravenpose.load_limit_kg",
+];
+
+fn load(metadata: &BTreeMap<String, String>) -> Result<Option<LoadCard>, CardError> {
+    if LOAD.iter().all(|key| !metadata.contains_key(*key)) {
+        return Ok(None);
+    }
+    let get = |key: &'static str| metadata.get(key).map(String::as_str).ok_or(CardError::Missing { key });
+    let expected: Vec<f32> = words(LOAD[0], get(LOAD[0])?)?.into_iter().map(|value| value as f32).collect();
+    if expected.is_empty() || !expected.len().is_multiple_of(load::MOTORS) {
+        let problem = format!("{} numbers, expected as many for each of {} motors", expected.len(), load::MOTORS);
+        return Err(CardError::Numbers { key: LOAD[0], problem });
+    }
+    let width = expected.len() / load::MOTORS;
+    let pull: [f32; 4 * load::MOTORS] = numbers(LOAD[1], get(LOAD[1])?)?;
+    let card = LoadCard {
+        expected: std::array::from_fn(|motor| expected[motor * width..(motor + 1) * width].to_vec()),
+        pull: std::array::from_fn(|motor| std::array::from_fn(|term| pull[4 * motor + term])),
+        weight: numbers(LOAD[2], get(LOAD[2])?)?,
+        travel_deg: numbers(LOAD[3], get(LOAD[3])?)?,
+        information: numbers(LOAD[4], get(LOAD[4])?)?,
+        limit_kg: numbers::<1>(LOAD[5], get(LOAD[5])?)?[0],
+    };
+    if let Some(weight) = card.weight.iter().find(|weight| **weight < 0.0) {
+        return Err(CardError::Numbers { key: LOAD[2], problem: format!("{weight} is below 0") });
+    }
+    for (key, all) in [(LOAD[3], &card.travel_deg[..]), (LOAD[4], &card.information[..]), (LOAD[5], &[card.limit_kg])] {
+        if let Some(value) = all.iter().find(|value| **value <= 0.0) {
+            return Err(CardError::Numbers { key, problem: format!("{value} is not above 0") });
+        }
+    }
+    Ok(Some(card))
+}
+
 fn golden(text: &str) -> Result<Vec<Golden>, CardError> {
     text.lines()
         .filter(|line| !line.trim().is_empty())
@@ -197,20 +248,19 @@ fn numbers<const N: usize>(key: &'static str, text: &str) -> Result<[f32; N], Ca
 }
 
 fn parse<const N: usize>(key: &'static str, text: &str) -> Result<[f64; N], CardError> {
-    let wrong = |problem: String| CardError::Numbers { key, problem };
-    let mut out = [0.0; N];
-    let mut count = 0;
-    for word in text.split_ascii_whitespace() {
-        let value: f64 = word.parse().map_err(|_| wrong(format!("{:?} is not a number", shorten(word))))?;
-        if !(value as f32).is_finite() {
-            return Err(wrong(format!("{:?} is not a finite number", shorten(word))));
-        }
-        if let Some(to) = out.get_mut(count) {
-            *to = value;
-        }
-        count += 1;
-    }
-    if count == N { Ok(out) } else { Err(wrong(format!("{count} numbers, expected {N}"))) }
+    let found = words(key, text)?;
+    let count = found.len();
+    found.try_into().map_err(|_| CardError::Numbers { key, problem: format!("{count} numbers, expected {N}") })
+}
+
+fn words(key: &'static str, text: &str) -> Result<Vec<f64>, CardError> {
+    let wrong = |word: &str, what: &str| CardError::Numbers { key, problem: format!("{:?} is not a {what}", shorten(word)) };
+    let number = |word: &str| match word.parse::<f64>() {
+        Ok(value) if (value as f32).is_finite() => Ok(value),
+        Ok(_) => Err(wrong(word, "finite number")),
+        Err(_) => Err(wrong(word, "number")),
+    };
+    text.split_ascii_whitespace().map(number).collect()
 }
 
 fn shorten(text: &str) -> String {

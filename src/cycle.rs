@@ -21,7 +21,7 @@ const GAP_MAX: u64 = 10_000;
 
 /// What evaluates the network: 118 features to a position error in mm. Nothing here may allocate, block or panic.
 pub trait Estimator {
-    /// Does its answer depend on the states before?
+    /// Does what it says depend on the states before?
     fn remembers(&self) -> bool {
         false
     }
@@ -35,6 +35,11 @@ pub trait Estimator {
     /// Has it seen enough of the motion?
     fn is_settled(&self) -> bool {
         true
+    }
+
+    /// What the arm seems to carry over what it may carry for this to be trusted: above 1 it may not. None where nobody looks.
+    fn load_score(&self) -> Option<f32> {
+        None
     }
 
     /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
@@ -514,6 +519,13 @@ impl<E: Estimator> Arm<E> {
         judged.score = verdict.score;
         if may_follow(judged.reasons) {
             model.estimator.follow(features, state.source_time_ns);
+            if let Some(load) = model.estimator.load_score() {
+                judged.score = judged.score.max(load);
+                if load > 1.0 {
+                    judged.reasons |= flag::OUT_OF_DOMAIN;
+                    judged.information |= flag::UNSEEN_LOAD;
+                }
+            }
         }
         if judged.reasons != 0 {
             return judged;

@@ -12,6 +12,7 @@ pub mod cycle;
 pub mod frozen;
 pub mod guard;
 pub mod histogram;
+pub mod load;
 pub mod memory;
 pub mod model;
 pub mod network;

@@ -1,10 +1,11 @@
 //! From a file to a model that the loop may run: size, hash, import, card, plan, golden pairs. Each step refuses with one line.
-//! What runs is an [`Estimate`]: the plan, and the memory in front of it if the model has one.
+//! What runs is an [`Estimate`]: the plan, the memory in front of it and the observer of the load beside it, if the model has them.
 
 use crate::card::{Card, CardError, Golden};
 use crate::config::{self, ModelSource, shown_path};
 use crate::cycle::{Estimator, Model};
 use crate::guard::Guard;
+use crate::load::{LoadCard, LoadObserver};
 use crate::memory::Memory;
 use crate::network::{self, Deviation, NotExactEnough, Plan};
 use ravenpose_importer::{Expected, ImportError, Network};
@@ -121,10 +122,11 @@ impl Loaded {
     }
 }
 
-/// A network as the loop runs it: its memory of the recent motion, and the plan.
+/// A network as the loop runs it: its memory of the recent motion, the plan, and what watches the load meanwhile.
 pub struct Estimate {
     plan: Plan,
     memory: Memory,
+    load: Option<LoadObserver>,
     /// The features, and behind them where they stand within each play.
     input: Box<[f32]>,
 }
@@ -133,7 +135,20 @@ impl Estimate {
     /// A network's plan with a memory that has seen nothing.
     pub fn new(network: &Network, plan: Plan) -> Self {
         let memory = Memory::new(&network.plays);
-        Self { plan, input: vec![0.0; FEATURES + memory.len()].into(), memory }
+        Self { plan, input: vec![0.0; FEATURES + memory.len()].into(), memory, load: None }
+    }
+
+    /// The same with an observer of the load.
+    #[must_use]
+    pub fn watching(self, load: Option<LoadCard>) -> Self {
+        Self { load: load.map(LoadObserver::new), ..self }
+    }
+
+    /// Puts the features and where they stand in the memory where plan and observer look for them.
+    fn see(&mut self, features: &[f32; FEATURES]) {
+        let (own, places) = self.input.split_at_mut(FEATURES);
+        own.copy_from_slice(features);
+        self.memory.places(features, places);
     }
 
     /// The plan.
@@ -144,15 +159,26 @@ impl Estimate {
 
 impl Estimator for Estimate {
     fn remembers(&self) -> bool {
-        !self.memory.is_empty()
+        !self.memory.is_empty() || self.load.is_some()
     }
 
     fn follow(&mut self, features: &[f32; FEATURES], time_ns: i64) {
         self.memory.follow(features, time_ns);
+        if self.load.as_ref().is_some_and(|load| load.is_due(time_ns)) {
+            self.see(features);
+            if let Some(load) = &mut self.load {
+                load.follow(&self.input, time_ns);
+            }
+        }
     }
 
+    /// The memory; what is carried stays in the gripper, whoever moves the arm.
     fn forget(&mut self) {
         self.memory.forget();
+    }
+
+    fn load_score(&self) -> Option<f32> {
+        self.load.as_ref().map(LoadObserver::score)
     }
 
     fn is_settled(&self) -> bool {
@@ -163,9 +189,7 @@ impl Estimator for Estimate {
         if self.memory.is_empty() {
             return self.plan.run(features, error_mm);
         }
-        let (own, places) = self.input.split_at_mut(FEATURES);
-        own.copy_from_slice(features);
-        self.memory.places(features, places);
+        self.see(features);
         self.plan.run(&self.input, error_mm);
     }
 
@@ -209,14 +233,14 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let card = Card::read(&network.metadata).map_err(unusable)?;
     check_golden(&path, &mut Estimate::new(&network, Plan::new(&network)), &card)?;
     card.check_range().map_err(unusable)?;
-    card.check_memory(!network.plays.is_empty()).map_err(unusable)?;
+    card.check_memory(network.plays.len()).map_err(unusable)?;
     // Places of a memory that has seen nothing else are zero.
     let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len()]].concat();
     let golden: Vec<Vec<f32>> = card.golden.iter().map(seen).collect();
     let choice = network::choose(&network, &golden, source.weights_deviation_um / 1000.0, source.weights)
         .map_err(|cause| ModelError::Weights { path: path.clone(), cause })?;
     let model = Model {
-        estimator: Estimate::new(&network, choice.plan),
+        estimator: Estimate::new(&network, choice.plan).watching(card.load.clone()),
         guard: Guard::new(card.domain.clone()),
         id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
         bound_um: card.bound_mm * 1000.0,

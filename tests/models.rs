@@ -381,6 +381,50 @@ fn every_missing_property_of_a_trained_model_is_refused_by_name() {
     assert!(line.starts_with("property ravenpose.feature_max is missing"), "half a domain: {line}");
 }
 
+/// The card of a model that watches the load.
+fn watching() -> Onnx {
+    let rows = [0.1; 3 * 122];
+    small()
+        .trained()
+        .set("ravenpose.load_expected", words(&rows))
+        .set("ravenpose.load_pull", words(&[0.5; 12]))
+        .set("ravenpose.load_weight", "1 0 3")
+        .set("ravenpose.load_travel_deg", "10 20 30")
+        .set("ravenpose.load_information", "1 2 3")
+        .set("ravenpose.load_limit_kg", "0.25")
+}
+
+#[test]
+fn what_a_card_says_about_load_is_read_whole_or_refused() {
+    let directory = TempDir::new("models-load");
+    let (_, card) = load_bytes(&directory, &small().trained().bytes()).expect("a model that does not watch");
+    assert_eq!(card.load, None);
+    let (model, card) = load_bytes(&directory, &watching().bytes()).expect("a model that does");
+    let load = card.load.expect("load");
+    assert_eq!((load.weight, load.travel_deg, load.limit_kg), ([1.0, 0.0, 3.0], [10.0, 20.0, 30.0], 0.25));
+    assert!(load.expected.iter().all(|row| row.len() == 122) && load.pull == [[0.5; 4]; 3]);
+    assert_eq!(ravenpose::cycle::Estimator::load_score(&model.estimator), Some(0.0));
+    for key in ["load_expected", "load_pull", "load_weight", "load_travel_deg", "load_information", "load_limit_kg"] {
+        let key = format!("ravenpose.{key}");
+        let line = refusal(&directory, &watching().without(&key).bytes());
+        assert_eq!(line, format!("property {key} is missing; a trained model states it, see docs/models.md"));
+    }
+    for (key, value, problem) in [
+        ("load_expected", words(&[0.1; 3 * 121]), "121 numbers per motor, expected 122 for 0 plays"),
+        ("load_expected", words(&[0.1; 100]), "100 numbers, expected as many for each of 3 motors"),
+        ("load_expected", String::new(), "0 numbers, expected as many for each of 3 motors"),
+        ("load_expected", "nan 1 2".to_owned(), "\"nan\" is not a finite number"),
+        ("load_pull", words(&[0.5; 11]), "11 numbers, expected 12"),
+        ("load_weight", "1 -1 1".to_owned(), "-1 is below 0"),
+        ("load_travel_deg", "1 0 1".to_owned(), "0 is not above 0"),
+        ("load_information", "1 -2 1".to_owned(), "-2 is not above 0"),
+        ("load_limit_kg", "0".to_owned(), "0 is not above 0"),
+    ] {
+        let key = format!("ravenpose.{key}");
+        assert_eq!(refusal(&directory, &watching().set(&key, value).bytes()), format!("property {key}: {problem}"));
+    }
+}
+
 #[test]
 fn another_layout_or_unit_is_refused_with_expected_and_found() {
     let directory = TempDir::new("models-units");

@@ -8,6 +8,7 @@ mod proof;
 use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, nothing_happens, role, thread_id};
 use ravenpose::config::{ModelSource, Wait};
 use ravenpose::cycle::{ArmModel, Cycle, Limits};
+use ravenpose::load::{self, LoadCard};
 use ravenpose::memory::Play;
 use ravenpose::model::Estimate;
 use ravenpose::network::Plan;
@@ -35,13 +36,21 @@ fn untrained() -> ArmModel<Estimate> {
     ArmModel::Loaded(Box::new(loaded.model))
 }
 
-/// The same with another network, which has plays on all joints in front.
+/// The same with another network, which has plays on all joints in front, and an eye on the load.
 fn remembering() -> ArmModel<Estimate> {
     let mut loaded = model::load(&ModelSource::new(common::untrained())).expect("the repository's model");
     let plays: Vec<Play> = (56..64).map(|input| Play { input, half_width: 0.05 }).collect();
     let weight = |place: usize, _: usize| 0.001 * (place % 17) as f32 - 0.008;
     let network = Network { plays, ..Network::dense(&[FEATURES + 8, 64, 3], Activation::Tanh, weight) };
-    loaded.model.estimator = Estimate::new(&network, Plan::new(&network));
+    let load = LoadCard {
+        expected: std::array::from_fn(|_| vec![0.001; load::expected_len(8)]),
+        pull: [[0.04, 1e-7, 1e-7, 1e-7]; load::MOTORS],
+        weight: [1e5; load::MOTORS],
+        travel_deg: [2e4; load::MOTORS],
+        information: [1e-3; load::MOTORS],
+        limit_kg: 1e6,
+    };
+    loaded.model.estimator = Estimate::new(&network, Plan::new(&network)).watching(Some(load));
     ArmModel::Loaded(Box::new(loaded.model))
 }
 

@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod load;
 mod memory;
 mod mix;
 mod rows;

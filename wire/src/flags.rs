@@ -78,6 +78,8 @@ pub mod flag {
     pub const RESET: u32 = 1 << 23;
     /// Information: the model's memory has not seen every joint move far enough yet; the bound is the one for that.
     pub const MEMORY_UNSETTLED: u32 = 1 << 24;
+    /// Information beside `out_of_domain`: the motors' torques show a load at the tip that the model was not trained with.
+    pub const UNSEEN_LOAD: u32 = 1 << 25;
 }
 
 /// The flags that mean fallback.
@@ -93,7 +95,7 @@ pub struct Flag {
 }
 
 /// Every flag with its name, lowest bit first.
-pub const FLAGS: [Flag; 24] = [
+pub const FLAGS: [Flag; 25] = [
     Flag { bit: flag::INPUT_NOT_FINITE, name: "input_not_finite" },
     Flag { bit: flag::INPUT_STALE, name: "input_stale" },
     Flag { bit: flag::INPUT_IMPOSSIBLE, name: "input_impossible" },
@@ -118,6 +120,7 @@ pub const FLAGS: [Flag; 24] = [
     Flag { bit: flag::SAW_DUPLICATE, name: "saw_duplicate" },
     Flag { bit: flag::RESET, name: "reset" },
     Flag { bit: flag::MEMORY_UNSETTLED, name: "memory_unsettled" },
+    Flag { bit: flag::UNSEEN_LOAD, name: "unseen_load" },
 ];
 
 /// The names of the bits that are set, lowest first.

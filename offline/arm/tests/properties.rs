@@ -81,6 +81,27 @@ fn gravity_feed_forward_is_the_same_on_both_arms() {
 }
 
 #[test]
+fn what_holds_a_mass_at_the_tip_does_the_work_that_lifts_it() {
+    let plant = Raven2::nominal().plant();
+    let gravity = nalgebra::Vector3::from(plant.control.gravity_model.gravity_m_s2);
+    for arm in Side::ALL.map(|side| Raven2::nominal().arm(side)) {
+        for joints in poses() {
+            let torque = arm.gravity.capstan_torque_per_tip_kg(&joints);
+            for (joint, torque) in torque.iter().enumerate() {
+                let tip = |step: f64| {
+                    let mut moved = joints;
+                    moved[joint] += step;
+                    arm.kinematics.tip_position(&moved)
+                };
+                let lifted = -gravity.dot(&(tip(1e-6) - tip(-1e-6))) / 2e-6;
+                let share = plant.transmission.gear_big / plant.transmission.ratio[joint];
+                assert!((torque - share * lifted).abs() < 1e-7, "joint {joint}: {torque} {}", share * lifted);
+            }
+        }
+    }
+}
+
+#[test]
 fn frames_are_orthonormal_and_right_handed() {
     for arm in Side::ALL.map(|side| Raven2::nominal().arm(side)) {
         for joints in poses() {

@@ -1,9 +1,10 @@
 //! `ravenpose evaluate`: what a model leaves on runs that it has not seen, with its rivals beside it.
 
 use crate::output;
-use crate::train::Named;
+use crate::train::{Named, side};
 use ::training::data::Reading;
 use ::training::evaluate::{self, Report};
+use arm::Side;
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -27,16 +28,15 @@ pub(crate) struct Wish {
     /// Of bootstrap and rivals
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Arm of a RAVEN-II
-    #[arg(long, default_value = "gold", value_parser = ["gold", "green"])]
-    arm: String,
+    /// Arm of a RAVEN-II, gold or green
+    #[arg(long, default_value = "gold", value_parser = side)]
+    arm: Side,
     #[command(flatten)]
     columns: Named,
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
-    let arm = usize::from(wish.arm == "green");
-    let reading = Reading { arm, seed: wish.seed, columns: wish.columns.columns(), ..Reading::default() };
+    let reading = Reading { arm: wish.arm, seed: wish.seed, columns: wish.columns.columns(), ..Reading::default() };
     let wanted = evaluate::Wish {
         model: &wish.model,
         data: &wish.data,
@@ -98,6 +98,8 @@ fn words(report: &Report) -> String {
     if let Some(words) = trust.settled() {
         lines.push(format!("by run {words}"));
     }
+    lines.extend(trust.load.iter().map(ToString::to_string));
+    lines.extend(trust.far_off.iter().map(ToString::to_string));
     lines.extend(trust.unsettled.iter().map(ToString::to_string));
     lines.join("\n") + "\n"
 }

@@ -4,6 +4,7 @@ use crate::output;
 use ::training::commands::{self, Done, Event};
 use ::training::data::{Columns, Reading};
 use ::training::preset::Recipe;
+use arm::Side;
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -43,9 +44,9 @@ pub(crate) struct Source {
     /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, mm
     #[arg(long, default_value_t = 0.0)]
     truth_noise: f64,
-    /// Arm of a RAVEN-II
-    #[arg(long, default_value = "gold", value_parser = ["gold", "green"])]
-    arm: String,
+    /// Arm of a RAVEN-II, gold or green
+    #[arg(long, default_value = "gold", value_parser = side)]
+    arm: Side,
     #[command(flatten)]
     columns: Named,
 }
@@ -71,10 +72,14 @@ impl Source {
             truth_noise_mm: self.truth_noise,
             seed: recipe.seed,
             plays: recipe.plays(),
-            arm: usize::from(self.arm == "green"),
+            arm: self.arm,
             columns: self.columns.columns(),
         })
     }
+}
+
+pub(crate) fn side(name: &str) -> Result<Side, String> {
+    Side::from_name(name).ok_or_else(|| "write gold or green".to_owned())
 }
 
 /// Columns of tables that are no RAVEN-II's states.

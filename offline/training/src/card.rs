@@ -3,13 +3,17 @@
 use crate::chain::Chain;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
+use crate::load;
 use crate::prepare::Prepared;
+use arm::Arm;
 use ravenpose_wire::{FEATURES, features};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Units that the service asks for.
 const UNITS: &str = "raven_state as published; position error in mm";
+/// Property: RMS of the vector that is left on the validation trajectories, without the truth's known noise; for `evaluate`.
+pub const VALIDATION_RMS: &str = "ravenpose.validation_rms";
 /// Coverage that the bound is stated for.
 pub const COVERAGE: f64 = 0.95;
 /// Share of the unseen trajectories in which it is to be reached at least.
@@ -33,9 +37,9 @@ const NORMAL_975: f64 = 1.959_964;
 pub struct Facts<'a> {
     /// The exported network.
     pub chain: &'a Chain,
-    /// Are the inputs `raven118-v1`, perhaps with a memory behind them? The card speaks of the layout's 118 only: what a memory
-    /// adds is bounded by itself.
-    pub is_raven: bool,
+    /// The arm, if the inputs are its `raven118-v1`, perhaps with a memory behind them. The card speaks of the layout's 118 only: what
+    /// a memory adds is bounded by itself.
+    pub arm: Option<&'a Arm>,
     /// What it looks at.
     pub prepared: &'a Prepared,
     /// Trajectories of training.
@@ -102,10 +106,10 @@ fn quantile(weighted: &mut [(f64, f64)], share: f64) -> f64 {
 pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
     let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
-    let is_raven = facts.is_raven;
+    let is_raven = facts.arm.is_some();
     let settled = bounds(facts.chain, facts.validation, facts.truth_noise_mm);
     put("trained_on", facts.trained_on.to_owned());
-    if is_raven {
+    if let Some(arm) = facts.arm {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
         if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm, &settled) {
@@ -119,6 +123,14 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
                 .map(|e| e.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt())
                 .collect::<Vec<_>>()
         });
+        if let Some(load) = load::fit(arm, facts.chain.plays.len(), facts.train, facts.validation) {
+            put("load_expected", load.expected.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
+            put("load_pull", load.pull.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
+            put("load_weight", words(&load.weight));
+            put("load_travel_deg", words(&load.travel_deg));
+            put("load_information", words(&load.information));
+            put("load_limit_kg", load.limit_kg.to_string());
+        }
         put("correction_bound_mm", format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
     }
     let (low, high) = ranges(facts, is_raven);
@@ -131,7 +143,18 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     put("domain_limit", limit.to_string());
     put("bound95_mm", words(&settled));
     put("golden", golden(facts));
+    card.insert(VALIDATION_RMS.to_owned(), validation_rms(facts).to_string());
     card
+}
+
+fn validation_rms(facts: &Facts) -> f64 {
+    let squares = |one: &Trajectory| {
+        let rests = one.labels.iter().zip(facts.chain.estimate(&one.inputs)).map(|(label, estimate)| f64::from(label - estimate));
+        rests.map(|rest| rest * rest).sum::<f64>()
+    };
+    let rows: usize = facts.validation.iter().map(Trajectory::rows).sum();
+    let mean = facts.validation.iter().map(squares).sum::<f64>() / rows as f64;
+    (mean - facts.truth_noise_mm * facts.truth_noise_mm).max(0.0).sqrt()
 }
 
 fn words<T: std::fmt::Display>(numbers: &[T]) -> String {
@@ -166,7 +189,7 @@ fn domain(facts: &Facts) -> (Vec<f32>, Vec<f32>, f32) {
     let center = facts.chain.shift.clone();
     let weight: Vec<f32> = (0..inputs)
         .map(|input| {
-            let counts = facts.prepared.uses(input) && !(facts.is_raven && input >= FEATURES);
+            let counts = facts.prepared.uses(input) && !(facts.arm.is_some() && input >= FEATURES);
             if counts { facts.chain.scale[input] } else { 0.0 }
         })
         .collect();
@@ -185,7 +208,7 @@ fn golden(facts: &Facts) -> String {
     let mut text = String::new();
     for k in 0..GOLDEN.min(rows.len()) {
         let mut row = rows[k * rows.len() / GOLDEN.min(rows.len())].to_vec();
-        let stated = if facts.is_raven { FEATURES } else { inputs };
+        let stated = if facts.arm.is_some() { FEATURES } else { inputs };
         // A memory that has seen nothing but this state.
         row[stated..].fill(0.0);
         let _ = writeln!(text, "{} {}", words(&row[..stated]), words(&facts.chain.estimate_exactly(&row)));

@@ -8,6 +8,7 @@ use crate::preset::Recipe;
 use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
 use crate::{figures, onnx};
+use arm::Raven2;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -77,9 +78,10 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let chain = Chain::of(&trained, &wish.reading.plays);
     let best = trained.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
     let (epoch, validation_rms) = best.map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
+    let arm = Raven2::nominal().arm(wish.reading.arm);
     let facts = Facts {
         chain: &chain,
-        is_raven: set.is_raven,
+        arm: set.is_raven.then_some(&arm),
         prepared: &trained.prepared,
         train: &parts.train,
         validation: &parts.validation,

@@ -11,6 +11,7 @@ pub mod data;
 pub mod error;
 pub mod evaluate;
 pub mod figures;
+pub mod load;
 pub mod network;
 pub mod onnx;
 pub mod prepare;

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Folder, runs, small};
+use ravenpose::card::Card;
 use ravenpose::config::ModelSource;
 use ravenpose::cycle::Estimator;
 use ravenpose::network::Format;
@@ -12,6 +13,7 @@ use recordings::open::{Opened, open};
 use recordings::stream::Record;
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading};
+use training::load;
 
 #[test]
 fn the_service_gives_for_a_run_what_training_says_of_it() {
@@ -23,7 +25,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
     let set = data::read(&files[..1], &reading, &mut |_, _| {}).expect("run");
     let expected = Model::read(&out).expect("model").chain.estimate(&set.trajectories[0].inputs);
     // Weights as they are, so that what is left is the order of the sums.
-    let source = ModelSource { weights: Some(Format::F32), ..ModelSource::new(out) };
+    let source = ModelSource { weights: Some(Format::F32), ..ModelSource::new(out.clone()) };
     let mut model = ravenpose::model::load(&source).expect("the service takes it").model;
     assert!(model.estimator.remembers() && !model.estimator.is_settled());
     let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
@@ -43,6 +45,12 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
         }
     }
     assert_eq!(found.len(), expected.len());
+    // What it makes of the load is the same too, places of the memory included.
+    let load = Card::read(&Model::read(&out).expect("model").card).expect("card").load.expect("they moved");
+    let masses = load::masses(&load, reading.plays.len(), &set.trajectories[0]);
+    let score = masses.last().expect("rows").abs() / f64::from(load.limit_kg);
+    let found_score = f64::from(model.estimator.load_score().expect("it looks"));
+    assert!(score > 0.01 && (found_score - score).abs() < 1e-4, "{found_score} {score}");
     let worst = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(worst < 1e-4, "{worst} mm");
     // And the memory matters: without it the answers are others.

@@ -7,6 +7,7 @@ mod table;
 
 use crate::error::{TrainingError, hex};
 use crate::random::Random;
+use arm::Side;
 use ravenpose::memory::Play;
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
@@ -148,15 +149,15 @@ pub struct Reading {
     pub seed: u64,
     /// Memory of the recent motion that is appended to the inputs of a RAVEN-II.
     pub plays: Vec<Play>,
-    /// Arm of a RAVEN-II: 0 gold, 1 green.
-    pub arm: usize,
+    /// Arm of a RAVEN-II.
+    pub arm: Side,
     /// Named columns instead of the state of a RAVEN-II.
     pub columns: Option<Columns>,
 }
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, plays: Vec::new(), arm: 0, columns: None }
+        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, plays: Vec::new(), arm: Side::Gold, columns: None }
     }
 }
 

@@ -79,7 +79,7 @@ struct Pairing<'a> {
 
 impl<'a> Pairing<'a> {
     fn new(file: &'a Path, reading: &Reading) -> Self {
-        let side = if reading.arm == 0 { Side::Gold } else { Side::Green };
+        let side = reading.arm;
         let name = file.file_name().map_or_else(|| shown(file), |name| name.to_string_lossy().into_owned());
         Self {
             file,

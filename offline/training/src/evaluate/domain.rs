@@ -1,9 +1,13 @@
 //! How often the bound that the card states holds, and how often its domain is left: computed as the service does.
 
-use super::{Rest, Trust, Unsettled};
+use super::{FarOff, Load, Rest, Trust, Unsettled};
+use crate::card::VALIDATION_RMS;
 use crate::commands::Model;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
+use crate::load;
+use ravenpose::card::Card;
+use ravenpose::load::LoadCard;
 use std::ops::Range;
 
 /// Inputs named in the report at most.
@@ -20,9 +24,9 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
     let limit = model.number("ravenpose.domain_limit").unwrap_or(f64::INFINITY);
     let inputs = model.chain.inputs().max(1);
     let mut left = vec![0_usize; low.len()];
-    let (mut rows, mut outside, mut beyond) = (0_usize, 0_usize, 0_usize);
+    let (mut outside, mut beyond) = (0_usize, 0_usize);
+    let mut doubtful: Vec<bool> = Vec::new();
     for row in test.iter().flat_map(|one| one.inputs.chunks_exact(inputs)) {
-        rows += 1;
         let mut inside = true;
         for (((value, low), high), left) in row.iter().zip(&low).zip(&high).zip(&mut left) {
             if !(f64::from(*value) >= *low && f64::from(*value) <= *high) {
@@ -32,9 +36,11 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
         }
         outside += usize::from(!inside);
         let squares: f64 = row.iter().zip(&center).zip(&weight).map(|((x, c), w)| ((f64::from(*x) - c) * w).powi(2)).sum();
-        beyond += usize::from(squares.sqrt() > limit);
+        let is_beyond = squares.sqrt() > limit;
+        beyond += usize::from(is_beyond);
+        doubtful.push(!inside || is_beyond);
     }
-    let share = |count: usize| 100.0 * count as f64 / rows.max(1) as f64;
+    let share = |count: usize| percent(count, doubtful.len().max(1));
     (trust.out_of_range, trust.out_of_domain) = (share(outside), share(beyond));
     let mut leaving: Vec<(String, f64)> =
         left.iter().zip(names).filter(|(count, _)| **count > 0).map(|(count, name)| (name.clone(), share(*count))).collect();
@@ -44,9 +50,56 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
     if !model.chain.plays.is_empty() {
         trust.settled_after_s = test.iter().map(|one| one.settled_after_s).collect();
     }
+    if let Some(card) = Card::read(&model.card).ok().and_then(|card| card.load) {
+        let flags: Vec<Vec<bool>> = test.iter().map(|one| load::unseen(&card, model.chain.plays.len(), one)).collect();
+        trust.load = Some(observed(&card, model, test, estimates, &trust.bound95, &flags));
+        doubtful.iter_mut().zip(flags.into_iter().flatten()).for_each(|(doubtful, unseen)| *doubtful |= unseen);
+    }
+    trust.far_off = model.number(VALIDATION_RMS).map(|rms| far_off(3.0 * rms, test, estimates, &doubtful));
     trust.bound95_unsettled = numbers("ravenpose.bound95_unsettled_mm");
     trust.unsettled = AGES_S.iter().filter_map(|age_s| unsettled(model, test, &trust.bound95_unsettled, age_s)).collect();
     trust
+}
+
+fn percent(count: usize, all: usize) -> f64 {
+    100.0 * count as f64 / all as f64
+}
+
+/// Each row's truth and estimate.
+fn rows<'a>(one: &'a Trajectory, estimate: &'a Rest) -> impl Iterator<Item = (&'a [f32], &'a [f32])> {
+    let outputs = (one.exact.len() / one.rows().max(1)).max(1);
+    one.exact.chunks_exact(outputs).zip(estimate.chunks_exact(outputs))
+}
+
+fn far_off(limit: f64, test: &[Trajectory], estimates: &[Rest], doubtful: &[bool]) -> FarOff {
+    let length = |(truth, estimate): (&[f32], &[f32])| {
+        truth.iter().zip(estimate).map(|(truth, estimate)| f64::from(truth - estimate).powi(2)).sum::<f64>().sqrt()
+    };
+    let all = test.iter().zip(estimates).flat_map(|(one, estimate)| rows(one, estimate).map(length));
+    let far: Vec<bool> = all.zip(doubtful).filter(|(length, _)| *length > limit).map(|(_, flag)| *flag).collect();
+    let flagged = far.iter().filter(|flag| **flag).count();
+    FarOff { limit, rows: percent(far.len(), doubtful.len().max(1)), flagged: percent(flagged, far.len()) }
+}
+
+fn observed(card: &LoadCard, model: &Model, test: &[Trajectory], estimates: &[Rest], bound95: &[f64], flags: &[Vec<bool>]) -> Load {
+    let plays = model.chain.plays.len();
+    let (mut others, mut inside) = (0_usize, 0_usize);
+    for ((one, estimate), flags) in test.iter().zip(estimates).zip(flags) {
+        for ((truth, estimate), _) in rows(one, estimate).zip(flags).filter(|(_, flag)| !**flag) {
+            let rests = truth.iter().zip(estimate).map(|(truth, estimate)| f64::from((truth - estimate).abs()));
+            others += truth.len();
+            inside += rests.zip(bound95).filter(|(rest, bound)| rest <= *bound).count();
+        }
+    }
+    let first = |(one, flags): (&Trajectory, &Vec<bool>)| Some(one.time_s[flags.iter().position(|flag| *flag)?]);
+    let unseen = flags.iter().flatten().filter(|flag| **flag).count();
+    Load {
+        limit_kg: f64::from(card.limit_kg),
+        mass_kg: test.iter().filter_map(|one| load::masses(card, plays, one).last().copied()).collect(),
+        unseen_from_s: test.iter().zip(flags).map(first).collect(),
+        unseen: percent(unseen, flags.iter().flatten().count().max(1)),
+        coverage_of_rest: percent(inside, others),
+    }
 }
 
 fn unsettled(model: &Model, test: &[Trajectory], bound95: &[f64], age_s: &Range<f64>) -> Option<Unsettled> {

@@ -82,6 +82,10 @@ pub struct Trust {
     pub settled_after_s: Vec<Option<f64>>,
     /// Half widths that the card states for those rows; none if it states none.
     pub bound95_unsettled: Vec<f64>,
+    /// What the motors' torque says about a load; none if the card says nothing of it.
+    pub load: Option<Load>,
+    /// Rows that are far off; none if the card does not say what is far.
+    pub far_off: Option<FarOff>,
 }
 
 impl Trust {
@@ -90,6 +94,59 @@ impl Trust {
         let one = |after_s: &Option<f64>| after_s.map_or("never".to_owned(), |after_s| format!("{after_s:.1} s"));
         let all: Vec<String> = self.settled_after_s.iter().map(one).collect();
         (!all.is_empty()).then(|| format!("the memory settled after: {}", all.join(", ")))
+    }
+}
+
+/// What the service would say about a load, were these runs carried out before it.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Load {
+    /// Mass from which on it is unseen, kg.
+    pub limit_kg: f64,
+    /// Estimate at the end of each run, kg.
+    pub mass_kg: Vec<f64>,
+    /// When each run said `unseen_load` first, s; none if it never did.
+    pub unseen_from_s: Vec<Option<f64>>,
+    /// Rows that say `unseen_load`, percent.
+    pub unseen: f64,
+    /// Share of the other rows within the stated bound over all axes, percent; NaN where there are none.
+    pub coverage_of_rest: f64,
+}
+
+impl std::fmt::Display for Load {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { limit_kg, mass_kg, unseen_from_s, unseen, coverage_of_rest } = self;
+        let masses: Vec<String> = mass_kg.iter().map(|mass| format!("{mass:.2}")).collect();
+        write!(f, "load weighed {} kg; unseen_load (beyond {limit_kg:.2} kg) in {unseen:.1} % of the rows", masses.join(", "))?;
+        if unseen_from_s.iter().any(Option::is_some) {
+            let from = |from_s: &Option<f64>| from_s.map_or("never".to_owned(), |from_s| format!("{from_s:.0} s"));
+            write!(f, ", from {} on", unseen_from_s.iter().map(from).collect::<Vec<_>>().join(", "))?;
+        }
+        if coverage_of_rest.is_finite() {
+            write!(f, "; the bound holds in {coverage_of_rest:.1} % of the others")?;
+        }
+        Ok(())
+    }
+}
+
+/// Rows that are off by more than three times the RMS on the validation trajectories, and how many of them the service would not have
+/// corrected.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct FarOff {
+    /// Three times that RMS, without the truth's known noise.
+    pub limit: f64,
+    /// Rows beyond it, percent.
+    pub rows: f64,
+    /// Share of them with `out_of_range` or `out_of_domain`, percent; NaN where there are none.
+    pub flagged: f64,
+}
+
+impl std::fmt::Display for FarOff {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.1} % of the rows are off by more than three times the RMS on validation ({:.2})", self.rows, self.limit)?;
+        if self.flagged.is_finite() {
+            write!(f, ", {:.1} % of them flagged", self.flagged)?;
+        }
+        Ok(())
     }
 }
 

@@ -130,6 +130,8 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
     if let Some(words) = trust.settled() {
         lines.push(format!("By run {words}."));
     }
+    lines.extend(trust.load.iter().map(|load| format!("By the motors' torque: {load}.")));
+    lines.extend(trust.far_off.iter().map(|far_off| format!("{far_off}.")));
     lines.extend(trust.unsettled.iter().map(|unsettled| format!("By age, {unit}: {unsettled}.")));
     if !trust.leaving.is_empty() {
         let names: Vec<String> = trust.leaving.iter().map(|(name, share)| format!("{name} ({share:.2} %)")).collect();

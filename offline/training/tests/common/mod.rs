@@ -39,12 +39,17 @@ impl Drop for Folder {
 
 /// Runs of so many seconds of the worn robot, one homing.
 pub(crate) fn runs(folder: &Folder, count: usize, seconds: f64, ending: &str) -> Vec<PathBuf> {
+    runs_of(Robot::worn(), 5, folder, count, seconds, ending)
+}
+
+/// The same of any robot; the seed is that of the motion.
+pub(crate) fn runs_of(robot: Robot, seed: u64, folder: &Folder, count: usize, seconds: f64, ending: &str) -> Vec<PathBuf> {
     let plan = Plan {
-        robot: Robot::worn(),
+        robot,
         sides: vec![Side::Gold],
         duration_s: seconds * count as f64,
         run_s: seconds,
-        seed: 5,
+        seed,
         homing_seed: Some(7),
         motion: Motion::Mixed,
     };

@@ -1,0 +1,187 @@
+//! What a model's card says about torque, so that the service notices a load that was not trained with (`ravenpose::load`).
+//!
+//! Expected torque: ridge regression on posture, speed, its sign and the memory. Torque of a mass at the tip: the arm's own statics as a linear
+//! function of the tip. Neither asks for a run with a load.
+
+use crate::data::Trajectory;
+use arm::Arm;
+use nalgebra::{DMatrix, DVector};
+use ravenpose::load::{self, LoadCard, LoadObserver, MOTORS, MPOS, MVEL, TAU};
+use ravenpose_wire::FEATURES;
+use std::ops::Range;
+
+/// Features that explain torque, beside the places of a memory and the signs of speeds: tip, joints 1 to 3, motor speeds without slot 3.
+const EXPLAINING: [Range<usize>; 4] = [0..3, 56..59, 64..67, 68..72];
+/// First joint angle, degrees; slot 3 belongs to no joint.
+const JPOS: usize = 56;
+const SLOTS: [usize; 7] = [0, 1, 2, 4, 5, 6, 7];
+/// Share of the mean square that keeps the normal equations solvable where inputs repeat each other.
+const RIDGE: f64 = 1e-6;
+/// An input whose standard deviation is less than this share of its largest size is constant.
+const CONSTANT: f64 = 1e-6;
+/// Usual motion over which the observer averages, s. Shorter, and what friction leaves is not averaged out; longer, and it comes later.
+const AVERAGED_S: f64 = 40.0;
+/// Rows further apart than this say nothing about speed, s.
+const APART_MAX_S: f64 = 0.2;
+/// Share of the rows that stay below the limit, and room beyond it.
+const LIMIT_SHARE: f64 = 0.999;
+const LIMIT_ROOM: f64 = 1.1;
+
+/// Fits what the observer needs to trajectories of one arm with so many plays behind its 118 features; the limit is taken from those
+/// of validation too. None where the arm hardly moved.
+pub fn fit(arm: &Arm, plays: usize, train: &[Trajectory], validation: &[Trajectory]) -> Option<LoadCard> {
+    let rows = Rows { width: FEATURES + plays, train };
+    let travel_deg = rows.usual_speed().map(|speed| (AVERAGED_S * speed) as f32);
+    if !travel_deg.iter().all(|travel| *travel > 0.0) {
+        return None;
+    }
+    let pull = rows.pull(arm)?;
+    let alone = |motor: usize| std::array::from_fn(|other| f32::from(u8::from(other == motor)));
+    let mut card = LoadCard {
+        expected: rows.expected()?,
+        pull: [[1.0, 0.0, 0.0, 0.0]; MOTORS],
+        weight: alone(0),
+        travel_deg,
+        information: [1.0; MOTORS],
+        limit_kg: 1.0,
+    };
+    // With a pull of 1 and one motor alone the observer averages what is left of that motor's torque.
+    let averaged = |motor: usize| {
+        let card = LoadCard { weight: alone(motor), ..card.clone() };
+        mean(train.iter().flat_map(|one| masses(&card, plays, one)).map(|left| left * left))
+    };
+    let weight: [f64; MOTORS] = std::array::from_fn(|motor| 1.0 / averaged(motor));
+    (card.pull, card.weight) = (pull, weight.map(|weight| weight as f32));
+    card.information = rows.usual_squares(&card).map(|square| square as f32);
+    let mut masses: Vec<f64> = train.iter().chain(validation).flat_map(|one| masses(&card, plays, one)).map(f64::abs).collect();
+    masses.sort_by(f64::total_cmp);
+    let place = (LIMIT_SHARE * masses.len() as f64) as usize;
+    card.limit_kg = (LIMIT_ROOM * masses.get(place)?) as f32;
+    let usable = |number: &f32| number.is_finite() && *number > 0.0;
+    let all = card.weight.iter().chain(&card.information).chain([&card.limit_kg]).all(usable);
+    all.then_some(card)
+}
+
+/// Estimated mass after each row of a trajectory, kg.
+pub fn masses(card: &LoadCard, plays: usize, one: &Trajectory) -> Vec<f64> {
+    follow(card, plays, one, LoadObserver::mass_kg)
+}
+
+/// Would the service call the load unseen after each row?
+pub fn unseen(card: &LoadCard, plays: usize, one: &Trajectory) -> Vec<bool> {
+    follow(card, plays, one, |observer| observer.score() > 1.0)
+}
+
+fn follow<T>(card: &LoadCard, plays: usize, one: &Trajectory, read: impl Fn(&LoadObserver) -> T) -> Vec<T> {
+    let mut observer = LoadObserver::new(card.clone());
+    let after = |(row, time_s): (&[f32], &f64)| {
+        observer.follow(row, (time_s * 1e9) as i64);
+        read(&observer)
+    };
+    one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s).map(after).collect()
+}
+
+struct Rows<'a> {
+    width: usize,
+    train: &'a [Trajectory],
+}
+
+impl<'a> Rows<'a> {
+    fn all(&self) -> impl Iterator<Item = &'a [f32]> + Clone + use<'a> {
+        let width = self.width;
+        self.train.iter().flat_map(move |one| one.inputs.chunks_exact(width))
+    }
+
+    /// Mean speed of each motor, degrees/s.
+    fn usual_speed(&self) -> [f64; MOTORS] {
+        let (mut ways, mut seconds) = ([0.0; MOTORS], 0.0);
+        for one in self.train {
+            let rows: Vec<&[f32]> = one.inputs.chunks_exact(self.width).collect();
+            for (rows, times) in rows.windows(2).zip(one.time_s.windows(2)) {
+                let apart_s = times[1] - times[0];
+                if apart_s <= APART_MAX_S {
+                    seconds += apart_s;
+                    for (motor, way) in ways.iter_mut().enumerate() {
+                        *way += f64::from((rows[1][MPOS + motor] - rows[0][MPOS + motor]).abs());
+                    }
+                }
+            }
+        }
+        ways.map(|way| way / seconds)
+    }
+
+    /// Coefficients of each motor's expected torque, in the form of the card.
+    fn expected(&self) -> Option<[Vec<f32>; MOTORS]> {
+        let inputs: Vec<usize> = EXPLAINING.into_iter().flatten().chain(FEATURES..self.width).collect();
+        let of = |row: &[f32]| {
+            let signs = row[MVEL..MVEL + MOTORS].iter().map(|speed| load::sign(*speed));
+            let explaining = inputs.iter().map(|input| row[*input]).chain(signs).map(f64::from).collect();
+            (explaining, std::array::from_fn(|motor| f64::from(row[TAU + motor])))
+        };
+        Some(regress(self.all().map(of))?.map(|terms| {
+            let mut row = vec![0.0; 1 + self.width + MOTORS];
+            row[0] = terms[0] as f32;
+            for (input, term) in inputs.iter().copied().chain(self.width..).zip(&terms[1..]) {
+                row[1 + input] = *term as f32;
+            }
+            row
+        }))
+    }
+
+    /// Coefficients of each motor's torque per kg at the tip, in the form of the card.
+    fn pull(&self, arm: &Arm) -> Option<[[f32; 4]; MOTORS]> {
+        let of = |row: &[f32]| {
+            let joints = SLOTS.map(|slot| f64::from(row[JPOS + slot]).to_radians());
+            (row[..3].iter().map(|um| f64::from(*um)).collect(), arm.gravity.capstan_torque_per_tip_kg(&joints))
+        };
+        let found = regress(self.all().map(of))?;
+        Some(found.map(|terms| std::array::from_fn(|term| terms[term] as f32)))
+    }
+
+    /// Mean square of each motor's pull, (N·m/kg)².
+    fn usual_squares(&self, card: &LoadCard) -> [f64; MOTORS] {
+        card.pull.map(|pull| mean(self.all().map(|row| (f64::from(pull[0]) + dot(&pull[1..], &row[..3])).powi(2))))
+    }
+}
+
+fn dot(terms: &[f32], row: &[f32]) -> f64 {
+    terms.iter().zip(row).map(|(term, value)| f64::from(*term) * f64::from(*value)).sum()
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
+    sum / f64::from(count)
+}
+
+/// Ridge regression of each output on the inputs and a constant: per output the constant, then the factors, in raw units. None without
+/// rows.
+fn regress(rows: impl Iterator<Item = (Vec<f64>, [f64; MOTORS])> + Clone) -> Option<[Vec<f64>; MOTORS]> {
+    let joined = |(inputs, outputs): (Vec<f64>, [f64; MOTORS])| {
+        DVector::from_iterator(inputs.len() + MOTORS, inputs.into_iter().chain(outputs))
+    };
+    let n = rows.clone().next()?.0.len();
+    let count = rows.clone().count() as f64;
+    let mean = rows.clone().map(joined).sum::<DVector<f64>>() / count;
+    let mut scatter = DMatrix::<f64>::zeros(n + MOTORS, n + MOTORS);
+    for row in rows {
+        let off = joined(row) - &mean;
+        scatter.ger(1.0 / count, &off, &off, 1.0);
+    }
+    // Each input by its own size; a constant one takes no part.
+    let size = |input: usize| {
+        let sd = scatter[(input, input)].sqrt();
+        if sd > CONSTANT * mean[input].abs() { 1.0 / sd } else { 0.0 }
+    };
+    let sizes = DVector::from_fn(n, |input, _| size(input));
+    let normal = DMatrix::from_fn(n, n, |r, c| {
+        let constant = r == c && sizes[r] == 0.0;
+        scatter[(r, c)] * sizes[r] * sizes[c] + if r == c { RIDGE } else { 0.0 } + f64::from(u8::from(constant))
+    });
+    let right = DMatrix::from_fn(n, MOTORS, |r, output| scatter[(r, n + output)] * sizes[r]);
+    let solved = normal.cholesky()?.solve(&right);
+    Some(std::array::from_fn(|output| {
+        let terms: Vec<f64> = (0..n).map(|input| solved[(input, output)] * sizes[input]).collect();
+        let constant = mean[n + output] - terms.iter().zip(mean.iter()).map(|(term, mean)| term * mean).sum::<f64>();
+        [vec![constant], terms].concat()
+    }))
+}

@@ -1,0 +1,40 @@
+//! A load that training has not seen shows in the motors' torque.
+#![allow(missing_docs)]
+
+mod common;
+
+use arm::{Raven2, Side};
+use common::{Folder, runs_of, small};
+use simulator::Robot;
+use training::data::{self, Reading, Trajectory};
+use training::load;
+
+const PAYLOAD: &str = "[[effect]]\nphysics = \"payload\"\nfrom_s = 60.0\nparameters = { m_p = 0.4, c_z = -0.45 }\n";
+
+#[test]
+fn a_mass_picked_up_after_training_is_noticed_and_weighed_and_none_is_not() {
+    let folder = Folder::new("load");
+    let recipe = small("default");
+    let reading = Reading { plays: recipe.plays(), ..Reading::default() };
+    let read = |robot: Robot, seed: u64, count: usize| -> Vec<Trajectory> {
+        let files = runs_of(robot, seed, &folder, count, 120.0, ".mcap");
+        data::read(&files, &reading, &mut |_, _| {}).expect("data").trajectories
+    };
+    let toml = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/raven2-worn.toml")).expect("robot");
+    let loaded = Robot::from_toml(&format!("{toml}\n{PAYLOAD}")).expect("robot");
+    let known = read(Robot::worn(), 5, 8);
+    let plays = reading.plays.len();
+    let card = load::fit(&Raven2::nominal().arm(Side::Gold), plays, &known[..6], &known[6..]).expect("they moved");
+    assert!((0.03..0.3).contains(&card.limit_kg), "{}", card.limit_kg);
+    for one in read(Robot::worn(), 6, 3) {
+        assert!(!load::unseen(&card, plays, &one).contains(&true), "{:?}", load::masses(&card, plays, &one).last());
+    }
+    for one in read(loaded, 6, 3) {
+        let unseen = load::unseen(&card, plays, &one);
+        let when_s = unseen.iter().zip(&one.time_s).find(|(unseen, _)| **unseen).map(|(_, time_s)| *time_s);
+        let mass_kg = *load::masses(&card, plays, &one).last().expect("rows");
+        assert!(when_s.is_some_and(|time_s| (60.0..110.0).contains(&time_s)), "{when_s:?}");
+        // Forty seconds of motion are a time constant: 0.4 (1 - exp(-60/40)) = 0.31 at the end of the usual run.
+        assert!((0.15..0.45).contains(&mass_kg), "{mass_kg}");
+    }
+}

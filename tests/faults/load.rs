@@ -1,0 +1,108 @@
+//! What the pose says while the estimator sees a load that the model was not trained with.
+
+use crate::world::{MS, state};
+use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::guard::{Domain, Guard};
+use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, flag};
+
+/// Feature of the first torque: as large as the load that [`Scale`] sees.
+const TAU: usize = 40;
+
+/// Corrects by 1 mm along z, and takes the first torque for the load's score.
+struct Scale(f32);
+
+impl Estimator for Scale {
+    fn remembers(&self) -> bool {
+        true
+    }
+
+    fn follow(&mut self, features: &[f32; FEATURES], _time_ns: i64) {
+        self.0 = features[TAU];
+    }
+
+    fn load_score(&self) -> Option<f32> {
+        Some(self.0)
+    }
+
+    fn run(&mut self, _features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+        *error_mm = [0.0, 0.0, 1.0];
+    }
+}
+
+struct Bench {
+    cycle: Cycle<Scale>,
+    pose: CorrectedPose,
+    step: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let all = |value: f32| [value; FEATURES];
+        let domain = Domain { min: all(f32::MIN), max: all(f32::MAX), center: all(0.0), weight: all(0.0), limit: 1.0 };
+        let model = Model {
+            estimator: Scale(0.0),
+            guard: Guard::new(Some(domain)),
+            id: 1,
+            bound_um: 8_000.0,
+            bound95_um: [300.0; 3],
+            bound95_unsettled_um: [f64::NAN; 3],
+            untrained: false,
+        };
+        let limits = Limits { recover_um: 1e6, rate_um: 1e6, ..Limits::default() };
+        let cycle = Cycle::new(limits, [ArmModel::Loaded(Box::new(model)), ArmModel::None], false, 0);
+        Self { cycle, pose: CorrectedPose::new(), step: 0 }
+    }
+
+    /// The last of so many poses with this load; the states before it are overtaken if `skipped`.
+    fn carry(&mut self, load: f32, states: u64, skipped: bool) -> ArmPose {
+        for k in 0..states {
+            self.step += 1;
+            let now = (1_000 + self.step as i64) * MS;
+            let mut state = state(7, self.step, self.step, now);
+            state.tau[0] = load;
+            state.seal(self.step);
+            self.cycle.offer(&state, now);
+            if !skipped || k + 1 == states {
+                assert!(self.cycle.step(now, &mut (), &mut self.pose));
+                self.cycle.finish(now + 40_000, false, &mut self.pose);
+            }
+        }
+        self.pose.arm[0]
+    }
+}
+
+#[test]
+fn an_unseen_load_is_out_of_domain_at_once_and_the_correction_returns_when_it_is_gone() {
+    let mut bench = Bench::new();
+    let before = bench.carry(0.9, 150, false);
+    assert_eq!((before.status, before.flags, before.domain_score), (ArmStatus::Valid as u32, 0, 0.9));
+    assert_eq!(before.correction_um, [0.0, 0.0, 1000.0]);
+    let loaded = bench.carry(1.1, 1, false);
+    let wanted = flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD | flag::RESET;
+    assert_eq!((loaded.status, loaded.flags, loaded.domain_score), (ArmStatus::Fallback as u32, wanted, 1.1));
+    assert_eq!((loaded.correction_um, loaded.corrected_position_um), ([0.0; 3], loaded.raw_position_um));
+    assert!(loaded.bound95_um.iter().all(|bound| bound.is_nan()));
+    // Still carried: still said, and nothing is counted down.
+    let later = bench.carry(1.1, 200, false);
+    assert_eq!((later.flags, later.hold_cycles), (flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD, 100));
+    let gone = bench.carry(0.5, 100, false);
+    assert_eq!((gone.status, gone.flags), (ArmStatus::Fallback as u32, flag::SETTLING));
+    assert_eq!(bench.carry(0.5, 1, false).correction_um, [0.0, 0.0, 1000.0]);
+}
+
+#[test]
+fn states_that_newer_ones_overtake_show_it_too() {
+    let mut bench = Bench::new();
+    let _ = bench.carry(0.0, 150, false);
+    assert_eq!(bench.carry(0.5, 5, true).domain_score, 0.5);
+    assert_ne!(bench.carry(2.0, 5, true).flags & flag::UNSEEN_LOAD, 0);
+}
+
+#[test]
+fn what_cannot_be_followed_says_nothing_about_the_load() {
+    let mut bench = Bench::new();
+    let _ = bench.carry(0.2, 150, false);
+    let broken = bench.carry(f32::NAN, 1, false);
+    assert_eq!((broken.flags & flag::UNSEEN_LOAD, broken.flags & flag::INPUT_NOT_FINITE), (0, flag::INPUT_NOT_FINITE));
+    assert_eq!(broken.domain_score, -1.0);
+}
