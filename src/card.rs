@@ -1,6 +1,6 @@
 //! The model card: ONNX metadata that says what a network may be used for. `docs/models.md` describes every property.
 
-use crate::guard::Domain;
+use crate::guard::{Allowed, Domain};
 use crate::load::{self, LoadCard};
 use ravenpose_wire::{FEATURES, features};
 use std::collections::BTreeMap;
@@ -10,6 +10,8 @@ use thiserror::Error;
 pub const UNITS: &str = "raven_state as published; position error in mm";
 /// Correction bound of a card that states none: the paper reports errors up to 10 mm.
 const BOUND_MM: f64 = 15.0;
+/// Run level of a trained card that states none: pedal down, the only one in which the motors follow the surgeon.
+const PEDAL_DOWN: i32 = 3;
 
 /// Why a card was refused; the caller adds the file's name.
 #[derive(Debug, Error, PartialEq)]
@@ -58,6 +60,8 @@ pub struct Card {
     pub trained_on: String,
     /// Trained domain; `None` only for an untrained model.
     pub domain: Option<Domain>,
+    /// States that the model may be used with.
+    pub allowed: Allowed,
     /// Largest correction that the model stands for, mm.
     pub bound_mm: f64,
     /// 95 % half width per axis, mm; NaN if none is stated.
@@ -111,12 +115,20 @@ impl Card {
         };
         let bound95_mm = half_widths("ravenpose.bound95_mm")?;
         let bound95_unsettled_mm = half_widths("ravenpose.bound95_unsettled_mm")?;
+        let allowed = Allowed {
+            runlevels: match get("ravenpose.runlevels") {
+                Some(text) => integers("ravenpose.runlevels", text)?,
+                None if untrained => Vec::new(),
+                None => vec![PEDAL_DOWN],
+            },
+            boards: get("ravenpose.boards").map_or(Ok(Vec::new()), |text| integers("ravenpose.boards", text))?,
+        };
         let load = load(metadata)?;
         let golden = golden(get("ravenpose.golden").unwrap_or(""))?;
         if golden.is_empty() && !untrained {
             return Err(CardError::Missing { key: "ravenpose.golden" });
         }
-        Ok(Self { untrained, trained_on, domain, bound_mm, bound95_mm, bound95_unsettled_mm, load, golden })
+        Ok(Self { untrained, trained_on, domain, allowed, bound_mm, bound95_mm, bound95_unsettled_mm, load, golden })
     }
 
     /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one; what watches the
@@ -241,6 +253,20 @@ fn golden(text: &str) -> Result<Vec<Golden>, CardError> {
             Ok(Golden { input: std::array::from_fn(|feature| row[feature] as f32), output })
         })
         .collect()
+}
+
+/// At least one.
+fn integers(key: &'static str, text: &str) -> Result<Vec<i32>, CardError> {
+    let integer = |word: &str| {
+        let problem = format!("{:?} is not a whole number", shorten(word));
+        word.parse().map_err(|_| CardError::Numbers { key, problem })
+    };
+    let found: Vec<i32> = text.split_ascii_whitespace().map(integer).collect::<Result<_, _>>()?;
+    if found.is_empty() {
+        Err(CardError::Numbers { key, problem: "no numbers, expected at least one".to_owned() })
+    } else {
+        Ok(found)
+    }
 }
 
 fn numbers<const N: usize>(key: &'static str, text: &str) -> Result<[f32; N], CardError> {

@@ -5,7 +5,7 @@
 //! why; the correction comes back after 100 good cycles in a row, slewed.
 
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
-use crate::guard::Guard;
+use crate::guard::{Allowed, Guard};
 use crate::memory::may_follow;
 use nalgebra::Vector3;
 use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
@@ -21,7 +21,7 @@ const GAP_MAX: u64 = 10_000;
 
 /// What evaluates the network: 118 features to a position error in mm. Nothing here may allocate, block or panic.
 pub trait Estimator {
-    /// Does what it says depend on the states before?
+    /// Does its answer depend on the states before?
     fn remembers(&self) -> bool {
         false
     }
@@ -36,6 +36,9 @@ pub trait Estimator {
     fn is_settled(&self) -> bool {
         true
     }
+
+    /// Takes in the features that it followed last, of a state in which the motors hold the arm: what do they hold?
+    fn weigh(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
 
     /// What the arm seems to carry over what it may carry for this to be trusted: above 1 it may not. None where nobody looks.
     fn load_score(&self) -> Option<f32> {
@@ -94,6 +97,8 @@ pub struct Model<E> {
     pub estimator: E,
     /// Admission of its inputs.
     pub guard: Guard,
+    /// The states that it may be used with at all.
+    pub allowed: Allowed,
     /// First eight bytes of the file's SHA-256.
     pub id: u64,
     /// Largest correction that the model stands for, µm (Euclidean).
@@ -517,8 +522,15 @@ impl<E: Estimator> Arm<E> {
         let verdict = model.guard.check(features);
         judged.reasons |= verdict.reasons;
         judged.score = verdict.score;
+        let allowed = model.allowed.allows(state, index);
+        if !allowed {
+            judged.reasons |= flag::STATE_NOT_ALLOWED;
+        }
         if may_follow(judged.reasons) {
             model.estimator.follow(features, state.source_time_ns);
+            if allowed {
+                model.estimator.weigh(features, state.source_time_ns);
+            }
             if let Some(load) = model.estimator.load_score() {
                 judged.score = judged.score.max(load);
                 if load > 1.0 {

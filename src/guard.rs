@@ -4,7 +4,7 @@
 //! feature is compared with what the robot can produce at all ([`IMPOSSIBLE`]), with the range the model was trained on, and the
 //! features together with the trained domain by one scalar distance.
 
-use ravenpose_wire::{FEATURES, flag};
+use ravenpose_wire::{FEATURES, RavenState, flag};
 
 /// Closed interval of a feature; outside of it the robot cannot be (units as published).
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +72,23 @@ pub struct Domain {
     pub weight: [f32; FEATURES],
     /// Distance at the edge of the domain; the score is distance / limit.
     pub limit: f32,
+}
+
+/// Which states a model may be used with, whatever the features are. An empty list allows every one.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Allowed {
+    /// Run levels of the controller.
+    pub runlevels: Vec<i32>,
+    /// Numbers of the arm's board (`type` of the state): another board is another arm.
+    pub boards: Vec<i32>,
+}
+
+impl Allowed {
+    /// May this arm of this state be corrected?
+    pub fn allows(&self, state: &RavenState, arm: usize) -> bool {
+        let is_in = |list: &[i32], value: Option<&i32>| list.is_empty() || value.is_some_and(|value| list.contains(value));
+        is_in(&self.runlevels, Some(&state.runlevel)) && is_in(&self.boards, state.type_.get(arm))
+    }
 }
 
 /// What the guard found.

@@ -159,11 +159,14 @@ impl Estimate {
 
 impl Estimator for Estimate {
     fn remembers(&self) -> bool {
-        !self.memory.is_empty() || self.load.is_some()
+        !self.memory.is_empty()
     }
 
     fn follow(&mut self, features: &[f32; FEATURES], time_ns: i64) {
         self.memory.follow(features, time_ns);
+    }
+
+    fn weigh(&mut self, features: &[f32; FEATURES], time_ns: i64) {
         if self.load.as_ref().is_some_and(|load| load.is_due(time_ns)) {
             self.see(features);
             if let Some(load) = &mut self.load {
@@ -242,6 +245,7 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let model = Model {
         estimator: Estimate::new(&network, choice.plan).watching(card.load.clone()),
         guard: Guard::new(card.domain.clone()),
+        allowed: card.allowed.clone(),
         id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
         bound_um: card.bound_mm * 1000.0,
         bound95_um: card.bound95_mm.map(|mm| mm * 1000.0),

@@ -337,6 +337,11 @@ fn a_trained_model_loads_with_everything_that_its_card_states() {
     assert_eq!((card.bound_mm, card.bound95_mm), (12.5, [1.0, 2.0, 3.0]));
     assert_eq!((model.bound_um, model.bound95_um), (12_500.0, [1000.0, 2000.0, 3000.0]));
     assert_eq!(card.golden.len(), 4);
+    // Pedal down, unless it says otherwise; any board.
+    assert_eq!((card.allowed.runlevels.as_slice(), card.allowed.boards.as_slice()), (&[3][..], &[][..]));
+    let stated = small().trained().set("ravenpose.runlevels", "2 3").set("ravenpose.boards", "49");
+    let (model, _) = load_bytes(&directory, &stated.bytes()).expect("a trained model");
+    assert_eq!((model.allowed.runlevels.as_slice(), model.allowed.boards.as_slice()), (&[2, 3][..], &[49][..]));
     let domain = card.domain.expect("a domain");
     assert_eq!((domain.min[117], domain.max[0], domain.center[5], domain.weight[5], domain.limit), (-2.0, 2.0, 0.0, 0.5, 3.0));
 }
@@ -488,6 +493,9 @@ fn unusable_numbers_are_refused_with_the_property_and_the_problem() {
         ("bound95_unsettled_mm", "1 -2 3".to_owned(), "-2 is not a half width"),
         ("bound95_unsettled_mm", "1 2 2.9".to_owned(), "is narrower than ravenpose.bound95_mm"),
         ("bound95_unsettled_mm", "1 2 3".to_owned(), "the network has no memory"),
+        ("runlevels", "3 x".to_owned(), "\"x\" is not a whole number"),
+        ("runlevels", String::new(), "no numbers, expected at least one"),
+        ("boards", "49.5".to_owned(), "\"49.5\" is not a whole number"),
         ("golden", words(&[0.0; 120]), "120 numbers, expected 121"),
         ("golden", words(&[0.0; 122]), "122 numbers, expected 121"),
         ("golden", format!("{} 0 nan 0", with(0, "0")), "\"nan\" is not a finite number"),

@@ -37,7 +37,7 @@
 #define RAVENPOSE_STATUS_VALID 2u
 #define RAVENPOSE_STATUS_FALLBACK 3u
 
-/* Flags of an arm's estimate: bits 0 to 14 are reasons for fallback, the others inform (docs/flags.md). */
+/* Flags of an arm's estimate: bits 0 to 15 are reasons for fallback, the others inform (docs/flags.md). */
 #define RAVENPOSE_FLAG_INPUT_NOT_FINITE (1u << 0)
 #define RAVENPOSE_FLAG_INPUT_STALE (1u << 1)
 #define RAVENPOSE_FLAG_INPUT_IMPOSSIBLE (1u << 2)
@@ -53,6 +53,7 @@
 #define RAVENPOSE_FLAG_SETTLING (1u << 12)
 #define RAVENPOSE_FLAG_NEW_SOURCE (1u << 13)
 #define RAVENPOSE_FLAG_STOPPING (1u << 14)
+#define RAVENPOSE_FLAG_STATE_NOT_ALLOWED (1u << 15)
 #define RAVENPOSE_FLAG_RECOVERING (1u << 16)
 #define RAVENPOSE_FLAG_RATE_LIMITED (1u << 17)
 #define RAVENPOSE_FLAG_LATE (1u << 18)

@@ -43,7 +43,7 @@ fn tables() -> String {
         let _ = writeln!(text, "#define RAVENPOSE_STATUS_{} {}u", ArmStatus::name(status as u32).to_uppercase(), status as u32);
     }
     text.push_str(
-        "\n/* Flags of an arm's estimate: bits 0 to 14 are reasons for fallback, the others inform (docs/flags.md). */\n",
+        "\n/* Flags of an arm's estimate: bits 0 to 15 are reasons for fallback, the others inform (docs/flags.md). */\n",
     );
     for flag in FLAGS {
         let _ = writeln!(text, "#define RAVENPOSE_FLAG_{} (1u << {})", flag.name.to_uppercase(), flag.bit.trailing_zeros());

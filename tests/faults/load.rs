@@ -2,7 +2,7 @@
 
 use crate::world::{MS, state};
 use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
-use ravenpose::guard::{Domain, Guard};
+use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, flag};
 
 /// Feature of the first torque: as large as the load that [`Scale`] sees.
@@ -12,11 +12,7 @@ const TAU: usize = 40;
 struct Scale(f32);
 
 impl Estimator for Scale {
-    fn remembers(&self) -> bool {
-        true
-    }
-
-    fn follow(&mut self, features: &[f32; FEATURES], _time_ns: i64) {
+    fn weigh(&mut self, features: &[f32; FEATURES], _time_ns: i64) {
         self.0 = features[TAU];
     }
 
@@ -42,6 +38,7 @@ impl Bench {
         let model = Model {
             estimator: Scale(0.0),
             guard: Guard::new(Some(domain)),
+            allowed: Allowed { runlevels: vec![3], boards: Vec::new() },
             id: 1,
             bound_um: 8_000.0,
             bound95_um: [300.0; 3],
@@ -53,56 +50,61 @@ impl Bench {
         Self { cycle, pose: CorrectedPose::new(), step: 0 }
     }
 
-    /// The last of so many poses with this load; the states before it are overtaken if `skipped`.
-    fn carry(&mut self, load: f32, states: u64, skipped: bool) -> ArmPose {
-        for k in 0..states {
+    /// The last of so many poses with this load, and with the pedal down or up.
+    fn carry_at(&mut self, load: f32, states: u64, runlevel: i32) -> ArmPose {
+        for _ in 0..states {
             self.step += 1;
             let now = (1_000 + self.step as i64) * MS;
             let mut state = state(7, self.step, self.step, now);
             state.tau[0] = load;
+            state.runlevel = runlevel;
             state.seal(self.step);
             self.cycle.offer(&state, now);
-            if !skipped || k + 1 == states {
-                assert!(self.cycle.step(now, &mut (), &mut self.pose));
-                self.cycle.finish(now + 40_000, false, &mut self.pose);
-            }
+            assert!(self.cycle.step(now, &mut (), &mut self.pose));
+            self.cycle.finish(now + 40_000, false, &mut self.pose);
         }
         self.pose.arm[0]
+    }
+
+    fn carry(&mut self, load: f32, states: u64) -> ArmPose {
+        self.carry_at(load, states, 3)
     }
 }
 
 #[test]
 fn an_unseen_load_is_out_of_domain_at_once_and_the_correction_returns_when_it_is_gone() {
     let mut bench = Bench::new();
-    let before = bench.carry(0.9, 150, false);
+    let before = bench.carry(0.9, 150);
     assert_eq!((before.status, before.flags, before.domain_score), (ArmStatus::Valid as u32, 0, 0.9));
     assert_eq!(before.correction_um, [0.0, 0.0, 1000.0]);
-    let loaded = bench.carry(1.1, 1, false);
+    let loaded = bench.carry(1.1, 1);
     let wanted = flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD | flag::RESET;
     assert_eq!((loaded.status, loaded.flags, loaded.domain_score), (ArmStatus::Fallback as u32, wanted, 1.1));
     assert_eq!((loaded.correction_um, loaded.corrected_position_um), ([0.0; 3], loaded.raw_position_um));
     assert!(loaded.bound95_um.iter().all(|bound| bound.is_nan()));
     // Still carried: still said, and nothing is counted down.
-    let later = bench.carry(1.1, 200, false);
+    let later = bench.carry(1.1, 200);
     assert_eq!((later.flags, later.hold_cycles), (flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD, 100));
-    let gone = bench.carry(0.5, 100, false);
+    let gone = bench.carry(0.5, 100);
     assert_eq!((gone.status, gone.flags), (ArmStatus::Fallback as u32, flag::SETTLING));
-    assert_eq!(bench.carry(0.5, 1, false).correction_um, [0.0, 0.0, 1000.0]);
-}
-
-#[test]
-fn states_that_newer_ones_overtake_show_it_too() {
-    let mut bench = Bench::new();
-    let _ = bench.carry(0.0, 150, false);
-    assert_eq!(bench.carry(0.5, 5, true).domain_score, 0.5);
-    assert_ne!(bench.carry(2.0, 5, true).flags & flag::UNSEEN_LOAD, 0);
+    assert_eq!(bench.carry(0.5, 1).correction_um, [0.0, 0.0, 1000.0]);
 }
 
 #[test]
 fn what_cannot_be_followed_says_nothing_about_the_load() {
     let mut bench = Bench::new();
-    let _ = bench.carry(0.2, 150, false);
-    let broken = bench.carry(f32::NAN, 1, false);
+    let _ = bench.carry(0.2, 150);
+    let broken = bench.carry(f32::NAN, 1);
     assert_eq!((broken.flags & flag::UNSEEN_LOAD, broken.flags & flag::INPUT_NOT_FINITE), (0, flag::INPUT_NOT_FINITE));
     assert_eq!(broken.domain_score, -1.0);
+}
+
+#[test]
+fn with_the_pedal_up_nothing_is_weighed_nor_corrected() {
+    let mut bench = Bench::new();
+    let _ = bench.carry(0.2, 150);
+    let up = bench.carry_at(5.0, 10, 2);
+    assert_eq!((up.status, up.flags), (ArmStatus::Fallback as u32, flag::STATE_NOT_ALLOWED));
+    assert_eq!((up.correction_um, up.domain_score), ([0.0; 3], 0.2));
+    assert_eq!(bench.carry(0.2, 101).status, ArmStatus::Valid as u32);
 }

@@ -2,7 +2,7 @@
 
 use crate::world::{MS, state};
 use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
-use ravenpose::guard::{Domain, Guard};
+use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
 
 /// States after which it is settled.
@@ -63,6 +63,7 @@ impl Bench {
             let model = Model {
                 estimator: Counts::default(),
                 guard: Guard::new(Some(domain())),
+                allowed: Allowed::default(),
                 id: 1,
                 bound_um: 8_000.0,
                 bound95_um: [300.0, 400.0, 500.0],

@@ -1,7 +1,7 @@
 //! A plausible robot for the pure cycle: states that move within all limits, and an estimator with faults on demand.
 
 use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
-use ravenpose::guard::Guard;
+use ravenpose::guard::{Allowed, Guard};
 use ravenpose_wire::{CorrectedPose, FEATURES, RavenState};
 
 pub(crate) const MS: i64 = 1_000_000;
@@ -67,6 +67,7 @@ pub(crate) fn model() -> ArmModel<Fake> {
     ArmModel::Loaded(Box::new(Model {
         estimator: Fake::default(),
         guard: Guard::new(None),
+        allowed: Allowed::default(),
         id: 0x0123_4567_89ab_cdef,
         bound_um: BOUND_UM,
         bound95_um: [300.0, 400.0, 500.0],

@@ -59,6 +59,8 @@ pub mod flag {
     pub const NEW_SOURCE: u32 = 1 << 13;
     /// The service is stopping; this is its last message.
     pub const STOPPING: u32 = 1 << 14;
+    /// The run level, or the arm's board, is not one that the model may be used with.
+    pub const STATE_NOT_ALLOWED: u32 = 1 << 15;
 
     /// Information: the correction is on its way back from zero; the bound is widened by what is missing.
     pub const RECOVERING: u32 = 1 << 16;
@@ -83,7 +85,7 @@ pub mod flag {
 }
 
 /// The flags that mean fallback.
-pub const FALLBACK_REASONS: u32 = 0x7fff;
+pub const FALLBACK_REASONS: u32 = 0xffff;
 
 /// One row of the flag table.
 #[derive(Debug, Clone, Copy)]
@@ -95,7 +97,7 @@ pub struct Flag {
 }
 
 /// Every flag with its name, lowest bit first.
-pub const FLAGS: [Flag; 25] = [
+pub const FLAGS: [Flag; 26] = [
     Flag { bit: flag::INPUT_NOT_FINITE, name: "input_not_finite" },
     Flag { bit: flag::INPUT_STALE, name: "input_stale" },
     Flag { bit: flag::INPUT_IMPOSSIBLE, name: "input_impossible" },
@@ -111,6 +113,7 @@ pub const FLAGS: [Flag; 25] = [
     Flag { bit: flag::SETTLING, name: "settling" },
     Flag { bit: flag::NEW_SOURCE, name: "new_source" },
     Flag { bit: flag::STOPPING, name: "stopping" },
+    Flag { bit: flag::STATE_NOT_ALLOWED, name: "state_not_allowed" },
     Flag { bit: flag::RECOVERING, name: "recovering" },
     Flag { bit: flag::RATE_LIMITED, name: "rate_limited" },
     Flag { bit: flag::LATE, name: "late" },

@@ -7,7 +7,7 @@ use crate::load;
 use crate::prepare::Prepared;
 use arm::Arm;
 use ravenpose_wire::{FEATURES, features};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Units that the service asks for.
@@ -112,6 +112,11 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     if let Some(arm) = facts.arm {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
+        let all = || facts.train.iter().chain(facts.validation);
+        put("runlevels", list(all().flat_map(|one| one.runlevels.iter().copied())));
+        if all().all(|one| one.board != 0) {
+            put("boards", list(all().map(|one| one.board)));
+        }
         if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm, &settled) {
             put("bound95_unsettled_mm", words(&wider));
         }
@@ -145,6 +150,11 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     put("golden", golden(facts));
     card.insert(VALIDATION_RMS.to_owned(), validation_rms(facts).to_string());
     card
+}
+
+/// Each number once, in rising order.
+fn list(numbers: impl Iterator<Item = i32>) -> String {
+    words(&numbers.collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>())
 }
 
 fn validation_rms(facts: &Facts) -> f64 {

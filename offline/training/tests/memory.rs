@@ -36,6 +36,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
                 features::extract(&state, 0, &mut row);
                 time_ns += 1_000_000;
                 model.estimator.follow(&row, time_ns);
+                model.estimator.weigh(&row, time_ns);
             }
             Record::Truth(_) => {
                 let mut error_mm = [0.0; 3];

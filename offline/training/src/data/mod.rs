@@ -34,6 +34,10 @@ pub struct Trajectory {
     pub young_places: Vec<f32>,
     /// Per row: how long before that memory began, s; NaN where it has settled since.
     pub unsettled_s: Vec<f64>,
+    /// Run levels of its rows, in rising order; empty for a table.
+    pub runlevels: Vec<i32>,
+    /// Number of the arm's board (`type` of its states); 0 where the file does not say.
+    pub board: i32,
     /// How long the run's own memory took to settle, s from its first state; none if it never did, or there is none.
     pub settled_after_s: Option<f64>,
 }
@@ -80,9 +84,14 @@ impl Trajectory {
 
     /// Keeps one row in so many, the first of each.
     pub fn thin(&mut self, every: usize) {
+        self.keep(|row| row % every.max(1) == 0);
+    }
+
+    /// Keeps some rows.
+    fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         let rows = self.rows();
-        let (every, old) = (every.max(1), std::mem::take(&mut self.time_s));
-        let kept = || (0..rows).step_by(every);
+        let old = std::mem::take(&mut self.time_s);
+        let kept = || (0..rows).filter(|row| wanted(*row));
         self.time_s = kept().map(|row| old[row]).collect();
         for numbers in [&mut self.inputs, &mut self.labels, &mut self.exact, &mut self.young_places] {
             let width = numbers.len() / rows.max(1);

@@ -11,6 +11,8 @@ use recordings::open::{Opened, open};
 use recordings::stream::{Record, Truth};
 use std::path::Path;
 
+/// Run level in which the motors follow the surgeon. Brakes hold the arm otherwise, and cables are loaded differently.
+const PEDAL_DOWN: i32 = 3;
 /// A truth further from every state than this belongs to none: half a period of the slowest recordings (100 Hz).
 const APART_MAX_NS: i64 = 5_000_000;
 /// No arm of half a metre is off by more: units or frames contradict each other then.
@@ -52,7 +54,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
     if let Some(damage) = source.damage() {
         notes.push(format!("{}: {}: {}: what stands before it is used", shown(file), damage.place, damage.what));
     }
-    pairing.finish()
+    pairing.finish(notes)
 }
 
 /// The state being held until its truth comes.
@@ -74,6 +76,8 @@ struct Pairing<'a> {
     state_ns: i64,
     start_ns: Option<i64>,
     next_ns: i64,
+    /// Of each row.
+    runlevels: Vec<i32>,
     found: Trajectory,
 }
 
@@ -98,6 +102,7 @@ impl<'a> Pairing<'a> {
             state_ns: 0,
             start_ns: None,
             next_ns: i64::MIN,
+            runlevels: Vec::new(),
             found: Trajectory { name, ..Trajectory::default() },
         }
     }
@@ -136,6 +141,7 @@ impl<'a> Pairing<'a> {
         if (truth.time_ns - self.state_ns).abs() > APART_MAX_NS {
             return Ok(());
         }
+        let (runlevel, board) = (state.runlevel, state.type_[self.side.index()]);
         let inputs = self.features;
         let Some(label) = self.label(state, truth) else { return Ok(()) };
         let start_ns = *self.start_ns.get_or_insert(truth.time_ns);
@@ -155,6 +161,8 @@ impl<'a> Pairing<'a> {
         // The next one a period after where this one should have been: rates keep their mean.
         self.next_ns = if self.next_ns == i64::MIN { truth.time_ns } else { self.next_ns };
         self.next_ns = (self.next_ns + self.period_ns).max(truth.time_ns + self.period_ns / 2);
+        self.found.board = board;
+        self.runlevels.push(runlevel);
         self.found.time_s.push(time_s);
         self.found.inputs.extend_from_slice(&inputs);
         let mut places = vec![0.0; self.memory.len()];
@@ -190,12 +198,26 @@ impl<'a> Pairing<'a> {
         TrainingError::Unfit { file: shown(self.file), what, remedy }
     }
 
-    fn finish(mut self) -> Result<Trajectory, TrainingError> {
+    fn finish(mut self, notes: &mut Vec<String>) -> Result<Trajectory, TrainingError> {
         if self.found.rows() == 0 {
             let looked_for = format!("no true tip and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
             return Err(TrainingError::NoTruth { file: shown(self.file), looked_for });
         }
         self.found.exact.clone_from(&self.found.labels);
+        let rows = self.found.rows();
+        if self.runlevels.contains(&PEDAL_DOWN) {
+            self.found.keep(|row| self.runlevels[row] == PEDAL_DOWN);
+            self.runlevels.retain(|runlevel| *runlevel == PEDAL_DOWN);
+        } else {
+            notes.push(format!("{}: never in run level {PEDAL_DOWN} (pedal down): all its rows are used", shown(self.file)));
+        }
+        if self.found.rows() < rows {
+            let (file, left) = (shown(self.file), rows - self.found.rows());
+            notes.push(format!("{file}: {left} of {rows} rows outside run level {PEDAL_DOWN} (pedal down) are left out"));
+        }
+        self.runlevels.sort_unstable();
+        self.runlevels.dedup();
+        self.found.runlevels = self.runlevels;
         Ok(self.found)
     }
 }

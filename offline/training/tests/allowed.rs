@@ -1,0 +1,54 @@
+//! Run level and board of what was learnt from: the card lists them, the service corrects in no other.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{Folder, runs, small};
+use ravenpose::config::ModelSource;
+use recordings::open::{Opened, open};
+use recordings::save::{self, StateFormat};
+use recordings::stream::Record;
+use std::path::{Path, PathBuf};
+use training::commands::{self, Wish};
+use training::data::{self, Reading};
+
+/// The same recording with other run levels: `level` of each state's number.
+fn at_levels(folder: &Folder, file: &Path, level: impl Fn(usize) -> i32) -> PathBuf {
+    let out = folder.file(&format!("levels_{}", file.file_name().expect("name").to_string_lossy()));
+    let Opened::States(mut source) = open(file).expect("recording") else { panic!("states") };
+    let mut sink = save::create_states(&out, StateFormat::Mcap, &[]).expect("file");
+    let mut states = 0;
+    while let Some(mut record) = source.next().expect("record") {
+        if let Record::State(state) = &mut record {
+            state.runlevel = level(states);
+            states += 1;
+        }
+        sink.write(&record).expect("record");
+    }
+    sink.finish().expect("file");
+    out
+}
+
+#[test]
+fn rows_with_the_pedal_up_are_not_learnt_and_the_service_does_not_correct_there() {
+    let folder = Folder::new("pedal");
+    let whole = runs(&folder, 3, 4.0, ".mcap");
+    let files: Vec<PathBuf> = whole.iter().map(|file| at_levels(&folder, file, |k| if k < 1000 { 2 } else { 3 })).collect();
+    let (out, recipe, reading) = (folder.file("model.onnx"), small("one-state"), Reading::default());
+    let done =
+        commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
+    assert_eq!(done.notes.len(), 3);
+    assert!(done.notes[0].contains("30 of 120 rows outside run level 3 (pedal down) are left out"), "{}", done.notes[0]);
+    assert_eq!(done.rows, [90; 3]);
+    let allowed = ravenpose::model::load(&ModelSource::new(out)).expect("the service takes it").model.allowed;
+    assert_eq!((allowed.runlevels, allowed.boards), (vec![3], vec![49]));
+}
+
+#[test]
+fn a_recording_that_never_says_pedal_down_is_used_as_it_is_and_says_so() {
+    let folder = Folder::new("level");
+    let file = at_levels(&folder, &runs(&folder, 1, 2.0, ".mcap")[0], |_| 0);
+    let set = data::read(&[file], &Reading::default(), &mut |_, _| {}).expect("rows");
+    assert_eq!((set.trajectories[0].rows(), set.trajectories[0].runlevels.as_slice()), (60, &[0][..]));
+    assert!(set.notes[0].contains("never in run level 3"), "{:?}", set.notes);
+}
