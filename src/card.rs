@@ -2,7 +2,7 @@
 
 use crate::guard::{Allowed, Domain};
 use crate::load::{self, LoadCard};
-use ravenpose_wire::{FEATURES, features};
+use ravenpose_wire::{FEATURES, PEDAL_DOWN, features};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
@@ -10,8 +10,6 @@ use thiserror::Error;
 pub const UNITS: &str = "raven_state as published; position error in mm";
 /// Correction bound of a card that states none: the paper reports errors up to 10 mm.
 const BOUND_MM: f64 = 15.0;
-/// Run level of a trained card that states none: pedal down, the only one in which the motors follow the surgeon.
-const PEDAL_DOWN: i32 = 3;
 
 /// Why a card was refused; the caller adds the file's name.
 #[derive(Debug, Error, PartialEq)]
@@ -153,6 +151,19 @@ impl Card {
         Ok(())
     }
 
+    /// `corrects in run levels 3, boards 49; watches the load, up to 0.13 kg`.
+    pub fn limits(&self) -> String {
+        let list = |numbers: &[i32]| match numbers {
+            [] => "any".to_owned(),
+            some => some.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
+        };
+        let load = self
+            .load
+            .as_ref()
+            .map_or("does not watch the load".to_owned(), |load| format!("watches the load, up to {:.2} kg", load.limit_kg));
+        format!("corrects in run levels {}, boards {}; {load}", list(&self.allowed.runlevels), list(&self.allowed.boards))
+    }
+
     /// Golden pairs are taken from training, so one outside of the trained range shows that the range is of another feature order
     /// or in other units, which the network's outputs alone cannot show.
     ///
@@ -204,9 +215,10 @@ fn domain(metadata: &BTreeMap<String, String>, untrained: bool) -> Result<Option
 }
 
 /// Keys of [`LoadCard`], in its order.
-const LOAD: [&str; 6] = [
+const LOAD: [&str; 7] = [
     "ravenpose.load_expected",
     "ravenpose.load_pull",
+    "ravenpose.load_noise_nm",
     "ravenpose.load_weight",
     "ravenpose.load_travel_deg",
     "ravenpose.load_information",
@@ -228,15 +240,18 @@ fn load(metadata: &BTreeMap<String, String>) -> Result<Option<LoadCard>, CardErr
     let card = LoadCard {
         expected: std::array::from_fn(|motor| expected[motor * width..(motor + 1) * width].to_vec()),
         pull: std::array::from_fn(|motor| std::array::from_fn(|term| pull[4 * motor + term])),
-        weight: numbers(LOAD[2], get(LOAD[2])?)?,
-        travel_deg: numbers(LOAD[3], get(LOAD[3])?)?,
-        information: numbers(LOAD[4], get(LOAD[4])?)?,
-        limit_kg: numbers::<1>(LOAD[5], get(LOAD[5])?)?[0],
+        noise_nm: numbers(LOAD[2], get(LOAD[2])?)?,
+        weight: numbers(LOAD[3], get(LOAD[3])?)?,
+        travel_deg: numbers(LOAD[4], get(LOAD[4])?)?,
+        information: numbers(LOAD[5], get(LOAD[5])?)?,
+        limit_kg: numbers::<1>(LOAD[6], get(LOAD[6])?)?[0],
     };
-    if let Some(weight) = card.weight.iter().find(|weight| **weight < 0.0) {
-        return Err(CardError::Numbers { key: LOAD[2], problem: format!("{weight} is below 0") });
+    // One that pulls nothing would never show anything.
+    if card.pull.iter().any(|row| row.iter().all(|term| *term == 0.0)) {
+        return Err(CardError::Numbers { key: LOAD[1], problem: "a motor's numbers are all 0".to_owned() });
     }
-    for (key, all) in [(LOAD[3], &card.travel_deg[..]), (LOAD[4], &card.information[..]), (LOAD[5], &[card.limit_kg])] {
+    let above_0 = [&card.noise_nm[..], &card.weight, &card.travel_deg, &card.information, &[card.limit_kg]];
+    for (key, all) in LOAD[2..].iter().zip(above_0) {
         if let Some(value) = all.iter().find(|value| **value <= 0.0) {
             return Err(CardError::Numbers { key, problem: format!("{value} is not above 0") });
         }

@@ -45,6 +45,11 @@ pub trait Estimator {
         None
     }
 
+    /// Has it seen enough motion to tell? Until then a load may be there.
+    fn has_weighed(&self) -> bool {
+        true
+    }
+
     /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
     fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]);
 
@@ -528,12 +533,12 @@ impl<E: Estimator> Arm<E> {
         }
         if may_follow(judged.reasons) {
             model.estimator.follow(features, state.source_time_ns);
-            if allowed {
+            if allowed && verdict.reasons == 0 {
                 model.estimator.weigh(features, state.source_time_ns);
             }
             if let Some(load) = model.estimator.load_score() {
                 judged.score = judged.score.max(load);
-                if load > 1.0 {
+                if !(load <= 1.0) {
                     judged.reasons |= flag::OUT_OF_DOMAIN;
                     judged.information |= flag::UNSEEN_LOAD;
                 }
@@ -612,6 +617,11 @@ impl<E: Estimator> Arm<E> {
             }
             _ => [f64::NAN; 3],
         };
+        if let ArmModel::Loaded(model) = &self.model
+            && !model.estimator.has_weighed()
+        {
+            out.flags |= flag::LOAD_UNWEIGHED;
+        }
         out.status = ArmStatus::Valid as u32;
         out.reset_count = self.reset_count;
         out.hold_cycles = 0;
@@ -631,7 +641,7 @@ impl<E: Estimator> Arm<E> {
         self.correction_um = Vector3::zeros();
         self.hold = limits.good_cycles;
         self.hold_flags |= reasons & flag::NEW_SOURCE;
-        out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING | flag::MEMORY_UNSETTLED);
+        out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING | flag::MEMORY_UNSETTLED | flag::LOAD_UNWEIGHED);
         self.show_raw(reasons | self.hold_flags, out);
         if announced {
             out.flags |= flag::RESET;

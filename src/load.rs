@@ -19,6 +19,10 @@ pub const MVEL: usize = 64;
 const STEP_NS: i64 = 33_000_000;
 /// Largest weight of one state, however far a motor went since the one before: 40 s of usual motion are 1200 states.
 const SHARE_MAX: f64 = 0.01;
+/// After so long without a state that was used, ns, the next one only says where the motors are: how they came there nobody weighed.
+pub const PAUSE_NS: i64 = 200_000_000;
+/// Unexplained torque counts up to so many standard deviations: a push is no load.
+const CLIP: f64 = 4.0;
 /// A load that was seen is gone when less than this share of the limit is left.
 const RELEASE: f64 = 0.6;
 
@@ -29,6 +33,8 @@ pub struct LoadCard {
     pub expected: [Vec<f32>; MOTORS],
     /// Torque per kg at the tip, N·m/kg: first number + the others · tip in µm.
     pub pull: [[f32; 4]; MOTORS],
+    /// Standard deviation of a single state's unexplained torque, N·m, of each motor.
+    pub noise_nm: [f32; MOTORS],
     /// Weight of each motor: one over the variance of what is left of its torque once averaged, 1/(N·m)².
     pub weight: [f32; MOTORS],
     /// Travel of each motor over which its average is taken, degrees.
@@ -49,6 +55,8 @@ pub struct LoadObserver {
     /// Of the last state that was used: time, ns, and motor positions, degrees.
     used_ns: i64,
     mpos: Option<[f32; MOTORS]>,
+    /// Travel of each motor since the start, in terms of that over which its average is taken.
+    travelled: [f64; MOTORS],
     is_unseen: bool,
 }
 
@@ -56,7 +64,15 @@ impl LoadObserver {
     /// One that believes that nothing is carried.
     pub fn new(card: LoadCard) -> Self {
         let information = card.information.map(f64::from);
-        Self { card, matched: [0.0; MOTORS], information, used_ns: i64::MIN, mpos: None, is_unseen: false }
+        Self {
+            card,
+            matched: [0.0; MOTORS],
+            information,
+            used_ns: i64::MIN,
+            mpos: None,
+            travelled: [0.0; MOTORS],
+            is_unseen: false,
+        }
     }
 
     /// Would a state of this time be used?
@@ -71,19 +87,22 @@ impl LoadObserver {
         if !self.is_due(time_ns) {
             return;
         }
+        let paused = time_ns.saturating_sub(self.used_ns) > PAUSE_NS;
         self.used_ns = time_ns;
-        let Some(before) = self.mpos.replace(*mpos) else { return };
+        let Some(before) = self.mpos.replace(*mpos).filter(|_| !paused) else { return };
         let signs = mvel.map(sign);
         for motor in 0..MOTORS {
             let share = f64::from((mpos[motor] - before[motor]).abs() / self.card.travel_deg[motor]);
             let unexplained = f64::from(tau[motor]) - affine(&self.card.expected[motor], input.iter().chain(&signs));
             let pull = affine(&self.card.pull[motor], input.iter());
-            let (matched, information) = (pull * unexplained, pull * pull);
+            let most = CLIP * f64::from(self.card.noise_nm[motor]);
+            let (matched, information) = (pull * unexplained.max(-most).min(most), pull * pull);
             // A number beyond all others would stay in the average for ever.
-            if share.is_finite() && matched.is_finite() && information.is_finite() {
+            if [share, unexplained, matched, information].iter().all(|number| number.is_finite()) {
                 let share = share.min(SHARE_MAX);
                 self.matched[motor] += share * (matched - self.matched[motor]);
                 self.information[motor] += share * (information - self.information[motor]);
+                self.travelled[motor] += share;
             }
         }
         self.is_unseen = self.mass_kg().abs() > f64::from(self.limit_kg());
@@ -94,6 +113,11 @@ impl LoadObserver {
         let weighted = |averages: [f64; MOTORS]| averages.iter().zip(self.card.weight).map(|(a, w)| a * f64::from(w)).sum::<f64>();
         let information = weighted(self.information);
         if information > 0.0 { weighted(self.matched) / information } else { 0.0 }
+    }
+
+    /// Have the motors moved far enough since the start for a load to show?
+    pub fn has_weighed(&self) -> bool {
+        self.travelled.iter().all(|travelled| *travelled >= 1.0)
     }
 
     /// Estimated mass over the mass at which it counts as unseen; above 1 it does. Once it does, less of it is enough.
@@ -136,6 +160,7 @@ mod tests {
         LoadObserver::new(LoadCard {
             expected: std::array::from_fn(|_| expected.clone()),
             pull: [[0.05, 0.0, 0.0, 0.0]; MOTORS],
+            noise_nm: [1.0; MOTORS],
             weight,
             travel_deg: [18_000.0; MOTORS],
             information: [0.05 * 0.05; MOTORS],
@@ -192,17 +217,46 @@ mod tests {
     }
 
     #[test]
-    fn more_states_per_second_make_no_difference() {
-        let (mut slow, mut quick) = (observer(), observer());
-        for ms in 1..100_000_i64 {
-            let state = input(2.02, (0.3 * ms as f32).sin() * 30.0);
-            quick.follow(&state, ms * 1_000_000);
-            if slow.is_due(ms * 1_000_000) {
-                slow.follow(&state, ms * 1_000_000);
+    fn what_counts_is_the_way_not_the_number_of_states() {
+        // The rows of training, at 30 and at 10 Hz, and the states of the service.
+        let weighed = [1_i64, 33, 100].map(|period_ms| {
+            let mut watched = observer();
+            for ms in (0..60_000).step_by(period_ms as usize) {
+                watched.follow(&input(2.02, (0.001 * ms as f32).sin() * 300.0), ms * 1_000_000);
             }
-        }
-        assert!(slow.mass_kg() > 0.05);
-        assert_eq!(slow.mass_kg(), quick.mass_kg());
+            watched.mass_kg()
+        });
+        assert!(weighed[0] > 0.05, "{weighed:?}");
+        assert!(weighed.iter().all(|mass_kg| (mass_kg / weighed[0] - 1.0).abs() < 0.02), "{weighed:?}");
+    }
+
+    #[test]
+    fn what_happened_in_a_pause_is_no_travel() {
+        let mut watched = observer();
+        let _ = carry(&mut watched, 0.2, 100);
+        let before = watched.clone();
+        watched.follow(&input(2.05, 5e3), before.used_ns + PAUSE_NS + 1);
+        assert_eq!((watched.mass_kg(), watched.travelled), (before.mass_kg(), before.travelled));
+        watched.follow(&input(2.05, 5e3 + 10.0), watched.used_ns + STEP);
+        assert!(watched.mass_kg() > before.mass_kg());
+    }
+
+    #[test]
+    fn it_has_weighed_after_one_travel_of_each_motor() {
+        let mut watched = observer();
+        let _ = carry(&mut watched, 0.0, 1790);
+        assert!(!watched.has_weighed());
+        let _ = carry(&mut watched, 0.0, 20);
+        assert!(watched.has_weighed());
+    }
+
+    #[test]
+    fn a_push_counts_no_more_than_what_friction_leaves() {
+        let mut watched = observer();
+        let _ = carry(&mut watched, 0.0, 10);
+        watched.follow(&input(100.0, 20.0), watched.used_ns + STEP);
+        // 4 of 1 N·m in place of 98: 4/0.05 kg, of which 20 or 10 of 18,000 degrees count.
+        assert!(watched.mass_kg() < 4.0 / 0.05 * 20.0 / 18_000.0 + 1e-3, "{}", watched.mass_kg());
     }
 
     #[test]

@@ -184,6 +184,10 @@ impl Estimator for Estimate {
         self.load.as_ref().map(LoadObserver::score)
     }
 
+    fn has_weighed(&self) -> bool {
+        self.load.as_ref().is_none_or(LoadObserver::has_weighed)
+    }
+
     fn is_settled(&self) -> bool {
         self.memory.is_settled()
     }

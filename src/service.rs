@@ -165,8 +165,8 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
             Ok(loaded) => {
                 let weights = loaded.weights();
                 names[arm] = format!("{:016x} {}, {weights}", loaded.model.id, source.path.display());
-                say(&format!("{} arm: {weights}", NAMES[arm]));
                 let card = &loaded.card;
+                say(&format!("{} arm: {weights}; {}", NAMES[arm], card.limits()));
                 if card.untrained && config.allow_untrained {
                     say(&format!(
                         "{} arm: the model is UNTRAINED; allow_untrained = true publishes its numbers all the same",

@@ -393,7 +393,8 @@ fn watching() -> Onnx {
         .trained()
         .set("ravenpose.load_expected", words(&rows))
         .set("ravenpose.load_pull", words(&[0.5; 12]))
-        .set("ravenpose.load_weight", "1 0 3")
+        .set("ravenpose.load_noise_nm", "0.1 0.2 0.3")
+        .set("ravenpose.load_weight", "1 2 3")
         .set("ravenpose.load_travel_deg", "10 20 30")
         .set("ravenpose.load_information", "1 2 3")
         .set("ravenpose.load_limit_kg", "0.25")
@@ -406,10 +407,12 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
     assert_eq!(card.load, None);
     let (model, card) = load_bytes(&directory, &watching().bytes()).expect("a model that does");
     let load = card.load.expect("load");
-    assert_eq!((load.weight, load.travel_deg, load.limit_kg), ([1.0, 0.0, 3.0], [10.0, 20.0, 30.0], 0.25));
+    assert_eq!((load.weight, load.travel_deg, load.limit_kg), ([1.0, 2.0, 3.0], [10.0, 20.0, 30.0], 0.25));
     assert!(load.expected.iter().all(|row| row.len() == 122) && load.pull == [[0.5; 4]; 3]);
     assert_eq!(ravenpose::cycle::Estimator::load_score(&model.estimator), Some(0.0));
-    for key in ["load_expected", "load_pull", "load_weight", "load_travel_deg", "load_information", "load_limit_kg"] {
+    for key in
+        ["load_expected", "load_pull", "load_noise_nm", "load_weight", "load_travel_deg", "load_information", "load_limit_kg"]
+    {
         let key = format!("ravenpose.{key}");
         let line = refusal(&directory, &watching().without(&key).bytes());
         assert_eq!(line, format!("property {key} is missing; a trained model states it, see docs/models.md"));
@@ -420,7 +423,9 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
         ("load_expected", String::new(), "0 numbers, expected as many for each of 3 motors"),
         ("load_expected", "nan 1 2".to_owned(), "\"nan\" is not a finite number"),
         ("load_pull", words(&[0.5; 11]), "11 numbers, expected 12"),
-        ("load_weight", "1 -1 1".to_owned(), "-1 is below 0"),
+        ("load_pull", "1 2 3 4 0 0 0 0 1 2 3 4".to_owned(), "a motor's numbers are all 0"),
+        ("load_noise_nm", "1 0 1".to_owned(), "0 is not above 0"),
+        ("load_weight", "1 -1 1".to_owned(), "-1 is not above 0"),
         ("load_travel_deg", "1 0 1".to_owned(), "0 is not above 0"),
         ("load_information", "1 -2 1".to_owned(), "-2 is not above 0"),
         ("load_limit_kg", "0".to_owned(), "0 is not above 0"),

@@ -45,11 +45,13 @@ fn remembering() -> ArmModel<Estimate> {
     let load = LoadCard {
         expected: std::array::from_fn(|_| vec![0.001; load::expected_len(8)]),
         pull: [[0.04, 1e-7, 1e-7, 1e-7]; load::MOTORS],
+        noise_nm: [0.1; load::MOTORS],
         weight: [1e5; load::MOTORS],
         travel_deg: [2e4; load::MOTORS],
         information: [1e-3; load::MOTORS],
         limit_kg: 1e6,
     };
+    loaded.model.allowed.runlevels = vec![3];
     loaded.model.estimator = Estimate::new(&network, Plan::new(&network)).watching(Some(load));
     ArmModel::Loaded(Box::new(loaded.model))
 }
@@ -99,6 +101,7 @@ fn faulty(sequence: u64) -> RavenState {
     let mut state = state(sequence);
     match sequence % 10_000 {
         0 => state.tau[0] = f32::NAN,
+        1_250 => state.runlevel = 2,
         2_500 => state.pos[0] = 9_000_000,
         5_000 => state.guard_tail ^= 1,
         7_500 => state.source_time_ns -= 50_000_000,

@@ -67,7 +67,7 @@ fn a_model_is_not_used_for_another_arm() {
 }
 
 #[test]
-fn a_card_that_states_neither_allows_all() {
+fn empty_lists_allow_all() {
     let (mut cycle, mut step) = (cycle(Limits::default()), 0);
     for runlevel in 0..4 {
         assert_eq!(after(&mut cycle, &mut step, 150, runlevel, [5, 6]), [VALID; 2]);

@@ -7,6 +7,8 @@ use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, flag};
 
 /// Feature of the first torque: as large as the load that [`Scale`] sees.
 const TAU: usize = 40;
+/// The most of it that the model has seen.
+const TAU_MAX: f32 = 10.0;
 
 /// Corrects by 1 mm along z, and takes the first torque for the load's score.
 struct Scale(f32);
@@ -18,6 +20,11 @@ impl Estimator for Scale {
 
     fn load_score(&self) -> Option<f32> {
         Some(self.0)
+    }
+
+    /// Of no load at all it is never sure.
+    fn has_weighed(&self) -> bool {
+        self.0 > 0.0
     }
 
     fn run(&mut self, _features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
@@ -34,7 +41,8 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let all = |value: f32| [value; FEATURES];
-        let domain = Domain { min: all(f32::MIN), max: all(f32::MAX), center: all(0.0), weight: all(0.0), limit: 1.0 };
+        let mut domain = Domain { min: all(f32::MIN), max: all(f32::MAX), center: all(0.0), weight: all(0.0), limit: 1.0 };
+        domain.max[TAU] = TAU_MAX;
         let model = Model {
             estimator: Scale(0.0),
             guard: Guard::new(Some(domain)),
@@ -107,4 +115,21 @@ fn with_the_pedal_up_nothing_is_weighed_nor_corrected() {
     assert_eq!((up.status, up.flags), (ArmStatus::Fallback as u32, flag::STATE_NOT_ALLOWED));
     assert_eq!((up.correction_um, up.domain_score), ([0.0; 3], 0.2));
     assert_eq!(bench.carry(0.2, 101).status, ArmStatus::Valid as u32);
+}
+
+#[test]
+fn what_lies_outside_the_training_is_not_weighed() {
+    let mut bench = Bench::new();
+    let _ = bench.carry(0.2, 150);
+    let pushed = bench.carry(TAU_MAX + 1.0, 1);
+    assert_eq!((pushed.flags & !flag::RESET, pushed.domain_score), (flag::OUT_OF_RANGE, 0.2));
+}
+
+#[test]
+fn until_it_has_weighed_a_valid_pose_says_so_and_a_raw_one_does_not() {
+    let mut bench = Bench::new();
+    let early = bench.carry(0.0, 150);
+    assert_eq!((early.status, early.flags), (ArmStatus::Valid as u32, flag::LOAD_UNWEIGHED));
+    assert_eq!(bench.carry_at(0.0, 1, 2).flags & flag::LOAD_UNWEIGHED, 0);
+    assert_eq!(bench.carry(0.5, 150).flags, 0);
 }

@@ -21,6 +21,8 @@ pub const GOLD: usize = 0;
 pub const GREEN: usize = 1;
 /// Inputs of a network: `raven118-v1`, the features of one arm.
 pub const FEATURES: usize = 118;
+/// Run level in which the motors follow the surgeon; in any other brakes hold the arm, and cables are loaded differently.
+pub const PEDAL_DOWN: i32 = 3;
 /// Name of the iceoryx2 service that carries [`RavenState`].
 pub const STATE_SERVICE: &str = "raven/state";
 /// Name of the iceoryx2 service that carries [`CorrectedPose`].

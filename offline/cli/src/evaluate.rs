@@ -3,7 +3,7 @@
 use crate::output;
 use crate::train::{Named, side};
 use ::training::data::Reading;
-use ::training::evaluate::{self, Report};
+use ::training::evaluate::{self, BY_TIME, Cell, Report};
 use arm::Side;
 use clap::Args;
 use std::io::IsTerminal;
@@ -100,6 +100,11 @@ fn words(report: &Report) -> String {
     }
     lines.extend(trust.load.iter().map(ToString::to_string));
     lines.extend(trust.far_off.iter().map(ToString::to_string));
+    let in_time: Vec<_> = report.breakdown.iter().filter(|cell| cell.by == BY_TIME).collect();
+    if in_time.len() > 1 {
+        let one = |cell: &&Cell| format!("{}: {:.3} RMS left, the bound holds in {:.1} %", cell.part, cell.after, cell.holds);
+        lines.push(format!("{BY_TIME}: {}", in_time.iter().map(one).collect::<Vec<_>>().join("; ")));
+    }
     lines.extend(trust.unsettled.iter().map(ToString::to_string));
     lines.join("\n") + "\n"
 }

@@ -3,10 +3,9 @@
 use crate::chain::Chain;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
-use crate::load;
 use crate::prepare::Prepared;
-use arm::Arm;
-use ravenpose_wire::{FEATURES, features};
+use ravenpose::load::LoadCard;
+use ravenpose_wire::{FEATURES, PEDAL_DOWN, features};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -37,11 +36,13 @@ const NORMAL_975: f64 = 1.959_964;
 pub struct Facts<'a> {
     /// The exported network.
     pub chain: &'a Chain,
-    /// The arm, if the inputs are its `raven118-v1`, perhaps with a memory behind them. The card speaks of the layout's 118 only: what
-    /// a memory adds is bounded by itself.
-    pub arm: Option<&'a Arm>,
+    /// Are the inputs `raven118-v1`, perhaps with a memory behind them? The card speaks of the layout's 118 only: what a memory
+    /// adds is bounded by itself.
+    pub is_raven: bool,
     /// What it looks at.
     pub prepared: &'a Prepared,
+    /// What torque tells about the load, if it does.
+    pub load: Option<&'a LoadCard>,
     /// Trajectories of training.
     pub train: &'a [Trajectory],
     /// Trajectories that the bound and the limit of the domain are taken from.
@@ -106,16 +107,16 @@ fn quantile(weighted: &mut [(f64, f64)], share: f64) -> f64 {
 pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
     let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
-    let is_raven = facts.arm.is_some();
+    let is_raven = facts.is_raven;
     let settled = bounds(facts.chain, facts.validation, facts.truth_noise_mm);
     put("trained_on", facts.trained_on.to_owned());
-    if let Some(arm) = facts.arm {
+    if is_raven {
         put("feature_layout", features::LAYOUT.to_owned());
         put("units", UNITS.to_owned());
-        let all = || facts.train.iter().chain(facts.validation);
-        put("runlevels", list(all().flat_map(|one| one.runlevels.iter().copied())));
-        if all().all(|one| one.board != 0) {
-            put("boards", list(all().map(|one| one.board)));
+        put("runlevels", PEDAL_DOWN.to_string());
+        let boards: BTreeSet<i32> = facts.train.iter().chain(facts.validation).map(|one| one.board).collect();
+        if !boards.contains(&0) {
+            put("boards", words(&boards.into_iter().collect::<Vec<_>>()));
         }
         if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm, &settled) {
             put("bound95_unsettled_mm", words(&wider));
@@ -128,9 +129,10 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
                 .map(|e| e.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt())
                 .collect::<Vec<_>>()
         });
-        if let Some(load) = load::fit(arm, facts.chain.plays.len(), facts.train, facts.validation) {
+        if let Some(load) = facts.load {
             put("load_expected", load.expected.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
             put("load_pull", load.pull.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
+            put("load_noise_nm", words(&load.noise_nm));
             put("load_weight", words(&load.weight));
             put("load_travel_deg", words(&load.travel_deg));
             put("load_information", words(&load.information));
@@ -150,11 +152,6 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     put("golden", golden(facts));
     card.insert(VALIDATION_RMS.to_owned(), validation_rms(facts).to_string());
     card
-}
-
-/// Each number once, in rising order.
-fn list(numbers: impl Iterator<Item = i32>) -> String {
-    words(&numbers.collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>())
 }
 
 fn validation_rms(facts: &Facts) -> f64 {
@@ -199,7 +196,7 @@ fn domain(facts: &Facts) -> (Vec<f32>, Vec<f32>, f32) {
     let center = facts.chain.shift.clone();
     let weight: Vec<f32> = (0..inputs)
         .map(|input| {
-            let counts = facts.prepared.uses(input) && !(facts.arm.is_some() && input >= FEATURES);
+            let counts = facts.prepared.uses(input) && !(facts.is_raven && input >= FEATURES);
             if counts { facts.chain.scale[input] } else { 0.0 }
         })
         .collect();
@@ -218,7 +215,7 @@ fn golden(facts: &Facts) -> String {
     let mut text = String::new();
     for k in 0..GOLDEN.min(rows.len()) {
         let mut row = rows[k * rows.len() / GOLDEN.min(rows.len())].to_vec();
-        let stated = if facts.arm.is_some() { FEATURES } else { inputs };
+        let stated = if facts.is_raven { FEATURES } else { inputs };
         // A memory that has seen nothing but this state.
         row[stated..].fill(0.0);
         let _ = writeln!(text, "{} {}", words(&row[..stated]), words(&facts.chain.estimate_exactly(&row)));

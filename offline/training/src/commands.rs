@@ -7,7 +7,7 @@ use crate::error::{TrainingError, hex, shown};
 use crate::preset::Recipe;
 use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
-use crate::{figures, onnx};
+use crate::{figures, load, onnx};
 use arm::Raven2;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -67,7 +67,8 @@ pub struct Done {
 /// # Errors
 /// [`TrainingError`]: data, checkpoint, or files that cannot be written.
 pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
-    let (set, mut parts) = read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
+    let (mut set, mut parts) =
+        read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
     let count = |part: &[Trajectory]| part.iter().map(Trajectory::rows).sum();
     let rows = [count(&parts.train), count(&parts.validation), parts.test.rows()];
     let trajectories = [parts.train.len(), parts.validation.len(), parts.test.names().len()];
@@ -78,10 +79,19 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let chain = Chain::of(&trained, &wish.reading.plays);
     let best = trained.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
     let (epoch, validation_rms) = best.map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
-    let arm = Raven2::nominal().arm(wish.reading.arm);
+    let mut notes = std::mem::take(&mut set.notes);
+    let load = if set.is_raven {
+        let arm = Raven2::nominal().arm(wish.reading.arm);
+        load::fit(&arm, chain.plays.len(), &parts.train, &parts.validation)
+            .map_err(|why| notes.push(format!("the model does not watch the load: {why}")))
+            .ok()
+    } else {
+        None
+    };
     let facts = Facts {
         chain: &chain,
-        arm: set.is_raven.then_some(&arm),
+        is_raven: set.is_raven,
+        load: load.as_ref(),
         prepared: &trained.prepared,
         train: &parts.train,
         validation: &parts.validation,
@@ -102,7 +112,7 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
         bounds: card::bounds(&chain, &parts.validation, wish.reading.truth_noise_mm),
         seconds: trained.seconds,
         weights: chain.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum(),
-        notes: set.notes,
+        notes,
         unit,
     })
 }

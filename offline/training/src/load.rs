@@ -21,64 +21,89 @@ const RIDGE: f64 = 1e-6;
 const CONSTANT: f64 = 1e-6;
 /// Usual motion over which the observer averages, s. Shorter, and what friction leaves is not averaged out; longer, and it comes later.
 const AVERAGED_S: f64 = 40.0;
-/// Rows further apart than this say nothing about speed, s.
-const APART_MAX_S: f64 = 0.2;
+/// Rows further apart than this say nothing about speed, s: a pause for the observer.
+const APART_MAX_S: f64 = load::PAUSE_NS as f64 * 1e-9;
+/// Time between two runs, s; more than a pause.
+const BETWEEN_S: f64 = 1.0;
+/// Less motion than this many averages long shows nothing about how far they stray.
+const MOTION_MIN_S: f64 = 5.0 * AVERAGED_S;
 /// Share of the rows that stay below the limit, and room beyond it.
 const LIMIT_SHARE: f64 = 0.999;
 const LIMIT_ROOM: f64 = 1.1;
 
 /// Fits what the observer needs to trajectories of one arm with so many plays behind its 118 features; the limit is taken from those
-/// of validation too. None where the arm hardly moved.
-pub fn fit(arm: &Arm, plays: usize, train: &[Trajectory], validation: &[Trajectory]) -> Option<LoadCard> {
+/// of validation too.
+///
+/// # Errors
+/// In words: rows too far apart, or too little motion.
+pub fn fit(arm: &Arm, plays: usize, train: &[Trajectory], validation: &[Trajectory]) -> Result<LoadCard, String> {
     let rows = Rows { width: FEATURES + plays, train };
-    let travel_deg = rows.usual_speed().map(|speed| (AVERAGED_S * speed) as f32);
-    if !travel_deg.iter().all(|travel| *travel > 0.0) {
-        return None;
+    let (speed, seconds) = rows.usual_speed();
+    if seconds < MOTION_MIN_S {
+        return Err(format!("{seconds:.0} s of rows no further apart than {APART_MAX_S} s, at least {MOTION_MIN_S} are needed"));
     }
-    let pull = rows.pull(arm)?;
+    let unclear = || "torque does not follow from posture and motion here".to_owned();
+    let pull = rows.pull(arm).ok_or_else(unclear)?;
+    let (expected, noise_nm) = rows.expected().ok_or_else(unclear)?;
     let alone = |motor: usize| std::array::from_fn(|other| f32::from(u8::from(other == motor)));
     let mut card = LoadCard {
-        expected: rows.expected()?,
+        expected,
         pull: [[1.0, 0.0, 0.0, 0.0]; MOTORS],
+        noise_nm,
         weight: alone(0),
-        travel_deg,
+        travel_deg: speed.map(|speed| (AVERAGED_S * speed) as f32),
         information: [1.0; MOTORS],
         limit_kg: 1.0,
     };
     // With a pull of 1 and one motor alone the observer averages what is left of that motor's torque.
     let averaged = |motor: usize| {
         let card = LoadCard { weight: alone(motor), ..card.clone() };
-        mean(train.iter().flat_map(|one| masses(&card, plays, one)).map(|left| left * left))
+        mean(weigh(&card, plays, train, |_| true).mass_kg.into_iter().map(|left| left * left))
     };
     let weight: [f64; MOTORS] = std::array::from_fn(|motor| 1.0 / averaged(motor));
     (card.pull, card.weight) = (pull, weight.map(|weight| weight as f32));
     card.information = rows.usual_squares(&card).map(|square| square as f32);
-    let mut masses: Vec<f64> = train.iter().chain(validation).flat_map(|one| masses(&card, plays, one)).map(f64::abs).collect();
+    let masses = weigh(&card, plays, train.iter().chain(validation), |_| true).mass_kg;
+    let mut masses: Vec<f64> = masses.into_iter().map(f64::abs).collect();
     masses.sort_by(f64::total_cmp);
     let place = (LIMIT_SHARE * masses.len() as f64) as usize;
-    card.limit_kg = (LIMIT_ROOM * masses.get(place)?) as f32;
+    card.limit_kg = (LIMIT_ROOM * masses.get(place).copied().unwrap_or(f64::NAN)) as f32;
     let usable = |number: &f32| number.is_finite() && *number > 0.0;
-    let all = card.weight.iter().chain(&card.information).chain([&card.limit_kg]).all(usable);
-    all.then_some(card)
+    let numbers = card.noise_nm.iter().chain(&card.weight).chain(&card.travel_deg).chain(&card.information).chain([&card.limit_kg]);
+    if numbers.into_iter().all(usable) { Ok(card) } else { Err("a motor hardly moved".to_owned()) }
 }
 
-/// Estimated mass after each row of a trajectory, kg.
-pub fn masses(card: &LoadCard, plays: usize, one: &Trajectory) -> Vec<f64> {
-    follow(card, plays, one, LoadObserver::mass_kg)
+/// What an observer says after each row.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Weighed {
+    /// Estimated mass, kg.
+    pub mass_kg: Vec<f64>,
+    /// Would the service call it unseen?
+    pub unseen: Vec<bool>,
 }
 
-/// Would the service call the load unseen after each row?
-pub fn unseen(card: &LoadCard, plays: usize, one: &Trajectory) -> Vec<bool> {
-    follow(card, plays, one, |observer| observer.score() > 1.0)
-}
-
-fn follow<T>(card: &LoadCard, plays: usize, one: &Trajectory, read: impl Fn(&LoadObserver) -> T) -> Vec<T> {
+/// Runs one observer through trajectories, one after the other as a service does that runs on; it is shown the rows, counted through all of
+/// them, that `admitted` lets it see.
+pub fn weigh<'a>(
+    card: &LoadCard,
+    plays: usize,
+    runs: impl IntoIterator<Item = &'a Trajectory>,
+    admitted: impl Fn(usize) -> bool,
+) -> Weighed {
     let mut observer = LoadObserver::new(card.clone());
-    let after = |(row, time_s): (&[f32], &f64)| {
-        observer.follow(row, (time_s * 1e9) as i64);
-        read(&observer)
-    };
-    one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s).map(after).collect()
+    let mut found = Weighed::default();
+    let mut begun_s = 0.0;
+    for one in runs {
+        for (row, time_s) in one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s) {
+            if admitted(found.unseen.len()) {
+                observer.follow(row, ((begun_s + time_s) * 1e9).round() as i64);
+            }
+            found.mass_kg.push(observer.mass_kg());
+            found.unseen.push(observer.score() > 1.0);
+        }
+        begun_s += one.time_s.last().unwrap_or(&0.0) + BETWEEN_S;
+    }
+    found
 }
 
 struct Rows<'a> {
@@ -92,8 +117,8 @@ impl<'a> Rows<'a> {
         self.train.iter().flat_map(move |one| one.inputs.chunks_exact(width))
     }
 
-    /// Mean speed of each motor, degrees/s.
-    fn usual_speed(&self) -> [f64; MOTORS] {
+    /// Mean speed of each motor, degrees/s, and over how many seconds.
+    fn usual_speed(&self) -> ([f64; MOTORS], f64) {
         let (mut ways, mut seconds) = ([0.0; MOTORS], 0.0);
         for one in self.train {
             let rows: Vec<&[f32]> = one.inputs.chunks_exact(self.width).collect();
@@ -107,25 +132,35 @@ impl<'a> Rows<'a> {
                 }
             }
         }
-        ways.map(|way| way / seconds)
+        (ways.map(|way| way / seconds), seconds)
     }
 
-    /// Coefficients of each motor's expected torque, in the form of the card.
-    fn expected(&self) -> Option<[Vec<f32>; MOTORS]> {
+    /// Coefficients of each motor's expected torque, in the form of the card, and the standard deviation of what they leave, N·m.
+    fn expected(&self) -> Option<([Vec<f32>; MOTORS], [f32; MOTORS])> {
         let inputs: Vec<usize> = EXPLAINING.into_iter().flatten().chain(FEATURES..self.width).collect();
         let of = |row: &[f32]| {
             let signs = row[MVEL..MVEL + MOTORS].iter().map(|speed| load::sign(*speed));
             let explaining = inputs.iter().map(|input| row[*input]).chain(signs).map(f64::from).collect();
             (explaining, std::array::from_fn(|motor| f64::from(row[TAU + motor])))
         };
-        Some(regress(self.all().map(of))?.map(|terms| {
-            let mut row = vec![0.0; 1 + self.width + MOTORS];
+        let found = regress(self.all().map(of))?;
+        let left = |motor: usize| {
+            let squares = self.all().map(of).map(|(explaining, torque)| {
+                let terms = found[motor][1..].iter().zip(explaining).map(|(term, value)| term * value);
+                (torque[motor] - found[motor][0] - terms.sum::<f64>()).powi(2)
+            });
+            mean(squares).sqrt() as f32
+        };
+        let noise_nm = std::array::from_fn(left);
+        let rows = found.map(|terms| {
+            let mut row = vec![0.0; load::expected_len(self.width - FEATURES)];
             row[0] = terms[0] as f32;
             for (input, term) in inputs.iter().copied().chain(self.width..).zip(&terms[1..]) {
                 row[1 + input] = *term as f32;
             }
             row
-        }))
+        });
+        Some((rows, noise_nm))
     }
 
     /// Coefficients of each motor's torque per kg at the tip, in the form of the card.

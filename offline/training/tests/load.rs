@@ -27,14 +27,23 @@ fn a_mass_picked_up_after_training_is_noticed_and_weighed_and_none_is_not() {
     let card = load::fit(&Raven2::nominal().arm(Side::Gold), plays, &known[..6], &known[6..]).expect("they moved");
     assert!((0.03..0.3).contains(&card.limit_kg), "{}", card.limit_kg);
     for one in read(Robot::worn(), 6, 3) {
-        assert!(!load::unseen(&card, plays, &one).contains(&true), "{:?}", load::masses(&card, plays, &one).last());
+        let weighed = load::weigh(&card, plays, [&one], |_| true);
+        assert!(!weighed.unseen.contains(&true), "{:?}", weighed.mass_kg.last());
     }
     for one in read(loaded, 6, 3) {
-        let unseen = load::unseen(&card, plays, &one);
-        let when_s = unseen.iter().zip(&one.time_s).find(|(unseen, _)| **unseen).map(|(_, time_s)| *time_s);
-        let mass_kg = *load::masses(&card, plays, &one).last().expect("rows");
+        let weighed = load::weigh(&card, plays, [&one], |_| true);
+        let when_s = weighed.unseen.iter().zip(&one.time_s).find(|(unseen, _)| **unseen).map(|(_, time_s)| *time_s);
+        let mass_kg = *weighed.mass_kg.last().expect("rows");
         assert!(when_s.is_some_and(|time_s| (60.0..110.0).contains(&time_s)), "{when_s:?}");
         // Forty seconds of motion are a time constant: 0.4 (1 - exp(-60/40)) = 0.31 at the end of the usual run.
         assert!((0.15..0.45).contains(&mass_kg), "{mass_kg}");
     }
+}
+
+#[test]
+fn a_few_seconds_of_motion_are_too_few_and_that_is_said() {
+    let folder = Folder::new("few");
+    let set = data::read(&runs_of(Robot::worn(), 5, &folder, 3, 5.0, ".mcap"), &Reading::default(), &mut |_, _| {}).expect("data");
+    let why = load::fit(&Raven2::nominal().arm(Side::Gold), 0, &set.trajectories, &[]).expect_err("too few");
+    assert!(why.contains("at least 200 are needed"), "{why}");
 }

@@ -34,8 +34,6 @@ pub struct Trajectory {
     pub young_places: Vec<f32>,
     /// Per row: how long before that memory began, s; NaN where it has settled since.
     pub unsettled_s: Vec<f64>,
-    /// Run levels of its rows, in rising order; empty for a table.
-    pub runlevels: Vec<i32>,
     /// Number of the arm's board (`type` of its states); 0 where the file does not say.
     pub board: i32,
     /// How long the run's own memory took to settle, s from its first state; none if it never did, or there is none.

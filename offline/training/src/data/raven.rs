@@ -6,13 +6,11 @@ use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
 use ravenpose::guard::Guard;
 use ravenpose::memory::{Memory, Play, may_follow_recorded};
-use ravenpose_wire::{FEATURES, RavenState, features};
+use ravenpose_wire::{FEATURES, PEDAL_DOWN, RavenState, features};
 use recordings::open::{Opened, open};
 use recordings::stream::{Record, Truth};
 use std::path::Path;
 
-/// Run level in which the motors follow the surgeon. Brakes hold the arm otherwise, and cables are loaded differently.
-const PEDAL_DOWN: i32 = 3;
 /// A truth further from every state than this belongs to none: half a period of the slowest recordings (100 Hz).
 const APART_MAX_NS: i64 = 5_000_000;
 /// No arm of half a metre is off by more: units or frames contradict each other then.
@@ -76,8 +74,12 @@ struct Pairing<'a> {
     state_ns: i64,
     start_ns: Option<i64>,
     next_ns: i64,
-    /// Of each row.
-    runlevels: Vec<i32>,
+    /// Has any state had another run level than 0? A file whose states all have 0 does not say: no arm moves in an e-stop.
+    says_runlevel: bool,
+    /// Truths left out because of the run level.
+    left_out: usize,
+    /// What is wrong with a row that may yet be left out.
+    doubt: Option<TrainingError>,
     found: Trajectory,
 }
 
@@ -102,7 +104,9 @@ impl<'a> Pairing<'a> {
             state_ns: 0,
             start_ns: None,
             next_ns: i64::MIN,
-            runlevels: Vec::new(),
+            says_runlevel: false,
+            left_out: 0,
+            doubt: None,
             found: Trajectory { name, ..Trajectory::default() },
         }
     }
@@ -110,6 +114,11 @@ impl<'a> Pairing<'a> {
     fn state(&mut self, state: Box<RavenState>) {
         let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
         self.state_ns = stamp_ns;
+        if state.runlevel != 0 && !std::mem::replace(&mut self.says_runlevel, true) {
+            self.left_out += self.found.rows();
+            self.found.keep(|_| false);
+            (self.start_ns, self.next_ns, self.doubt) = (None, i64::MIN, None);
+        }
         features::extract(&state, self.side.index(), &mut self.features);
         // As the service does it: what cannot be the robot's is not followed.
         if may_follow_recorded(&self.possible, &self.features) {
@@ -141,28 +150,25 @@ impl<'a> Pairing<'a> {
         if (truth.time_ns - self.state_ns).abs() > APART_MAX_NS {
             return Ok(());
         }
-        let (runlevel, board) = (state.runlevel, state.type_[self.side.index()]);
+        if self.says_runlevel && state.runlevel != PEDAL_DOWN {
+            self.left_out += 1;
+            return Ok(());
+        }
+        let board = state.type_[self.side.index()];
         let inputs = self.features;
         let Some(label) = self.label(state, truth) else { return Ok(()) };
         let start_ns = *self.start_ns.get_or_insert(truth.time_ns);
         let time_s = (truth.time_ns - start_ns) as f64 * 1e-9;
-        if let Some(feature) = inputs.iter().position(|value| !value.is_finite()) {
-            return Err(self.unfit(
-                format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature)),
-                "remove the row or record again",
-            ));
-        }
-        if label.iter().any(|part| part.abs() > ERROR_MAX_MM) {
-            let what = format!("truth and reported tip are {:.0} mm apart {time_s:.3} s after the first truth", norm(&label));
-            return Err(
-                self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm")
-            );
+        if let Some(error) = self.judge(&inputs, &label, time_s) {
+            if self.says_runlevel {
+                return Err(error);
+            }
+            self.doubt.get_or_insert(error);
         }
         // The next one a period after where this one should have been: rates keep their mean.
         self.next_ns = if self.next_ns == i64::MIN { truth.time_ns } else { self.next_ns };
         self.next_ns = (self.next_ns + self.period_ns).max(truth.time_ns + self.period_ns / 2);
         self.found.board = board;
-        self.runlevels.push(runlevel);
         self.found.time_s.push(time_s);
         self.found.inputs.extend_from_slice(&inputs);
         let mut places = vec![0.0; self.memory.len()];
@@ -174,6 +180,21 @@ impl<'a> Pairing<'a> {
         self.found.unsettled_s.push(if self.young.is_settled() { f64::NAN } else { age_s });
         self.found.labels.extend(label.map(|part| part as f32));
         Ok(())
+    }
+
+    /// What is wrong with a row, if anything.
+    fn judge(&self, inputs: &[f32; FEATURES], label: &[f64; 3], time_s: f64) -> Option<TrainingError> {
+        if let Some(feature) = inputs.iter().position(|value| !value.is_finite()) {
+            let what = format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature));
+            return Some(self.unfit(what, "remove the row or record again"));
+        }
+        if label.iter().any(|part| part.abs() > ERROR_MAX_MM) {
+            let what = format!("truth and reported tip are {:.0} mm apart {time_s:.3} s after the first truth", norm(label));
+            return Some(
+                self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm"),
+            );
+        }
+        None
     }
 
     /// True minus reported tip, mm, frame 0; none where the truth does not say.
@@ -199,25 +220,24 @@ impl<'a> Pairing<'a> {
     }
 
     fn finish(mut self, notes: &mut Vec<String>) -> Result<Trajectory, TrainingError> {
+        if let Some(doubt) = self.doubt {
+            return Err(doubt);
+        }
+        let file = shown(self.file);
+        if self.left_out > 0 && self.found.rows() == 0 {
+            let what = format!("all {} truths lie outside run level {PEDAL_DOWN} (pedal down)", self.left_out);
+            return Err(self.unfit(what, "record with the pedal down"));
+        }
+        if self.left_out > 0 {
+            notes.push(format!("{file}: {} truths outside run level {PEDAL_DOWN} (pedal down) are left out", self.left_out));
+        } else if !self.says_runlevel {
+            notes.push(format!("{file}: does not say its run levels: all its truths are used"));
+        }
         if self.found.rows() == 0 {
             let looked_for = format!("no true tip and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
-            return Err(TrainingError::NoTruth { file: shown(self.file), looked_for });
+            return Err(TrainingError::NoTruth { file, looked_for });
         }
         self.found.exact.clone_from(&self.found.labels);
-        let rows = self.found.rows();
-        if self.runlevels.contains(&PEDAL_DOWN) {
-            self.found.keep(|row| self.runlevels[row] == PEDAL_DOWN);
-            self.runlevels.retain(|runlevel| *runlevel == PEDAL_DOWN);
-        } else {
-            notes.push(format!("{}: never in run level {PEDAL_DOWN} (pedal down): all its rows are used", shown(self.file)));
-        }
-        if self.found.rows() < rows {
-            let (file, left) = (shown(self.file), rows - self.found.rows());
-            notes.push(format!("{file}: {left} of {rows} rows outside run level {PEDAL_DOWN} (pedal down) are left out"));
-        }
-        self.runlevels.sort_unstable();
-        self.runlevels.dedup();
-        self.found.runlevels = self.runlevels;
         Ok(self.found)
     }
 }

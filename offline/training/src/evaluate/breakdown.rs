@@ -1,4 +1,4 @@
-//! RMS before and after by region of the workspace, speed, direction and load.
+//! RMS before and after, and how often the bound holds, by region of the workspace, speed, direction, torque, and time into the run.
 
 use super::Rest;
 use crate::data::Trajectory;
@@ -17,7 +17,14 @@ pub struct Cell {
     pub before: f64,
     /// RMS of the vector with the model, mm.
     pub after: f64,
+    /// Share within the stated bound over all axes, percent; NaN where none is stated.
+    pub holds: f64,
 }
+
+/// [`Cell::by`] of the rows by when they are in their run.
+pub const BY_TIME: &str = "time into the run";
+/// Ends of the parts of a run, minutes.
+const PARTS_MIN: [f64; 5] = [5.0, 15.0, 30.0, 60.0, 120.0];
 
 /// Features of `raven118-v1`: reported tip, capstan torque of joint 2, motor speeds and lags of joints 1 to 3.
 const TIP: usize = 0;
@@ -27,24 +34,33 @@ const LAG: [(usize, usize); 3] = [(80, 48), (81, 49), (82, 50)];
 
 /// One row with what is asked of it.
 struct Row<'a> {
+    time_s: f64,
     inputs: &'a [f32],
     before: f64,
     after: f64,
+    /// Share of the axes within the bound.
+    held: f64,
 }
 
-/// All cells.
-pub(super) fn cells(test: &[Trajectory], estimates: &[Rest]) -> Vec<Cell> {
+/// All cells; `bound95` may be empty.
+pub(super) fn cells(test: &[Trajectory], estimates: &[Rest], bound95: &[f64]) -> Vec<Cell> {
     let rows: Vec<Row> = test
         .iter()
         .zip(estimates)
         .flat_map(|(one, estimate)| {
             let width = (one.inputs.len() / one.rows().max(1)).max(1);
-            one.inputs.chunks_exact(width).zip(one.exact.chunks_exact(3).zip(estimate.chunks_exact(3))).map(
-                |(inputs, (truth, estimate))| {
-                    let squares = |of: &dyn Fn(usize) -> f32| (0..3).map(|axis| f64::from(of(axis)).powi(2)).sum();
-                    Row { inputs, before: squares(&|axis| truth[axis]), after: squares(&|axis| truth[axis] - estimate[axis]) }
-                },
-            )
+            let inputs = one.time_s.iter().zip(one.inputs.chunks_exact(width));
+            inputs.zip(one.exact.chunks_exact(3).zip(estimate.chunks_exact(3))).map(|((time_s, inputs), (truth, estimate))| {
+                let rest = |axis: usize| f64::from(truth[axis] - estimate[axis]);
+                let inside = bound95.iter().enumerate().filter(|(axis, bound)| rest(*axis).abs() <= **bound).count();
+                Row {
+                    time_s: *time_s,
+                    inputs,
+                    before: (0..3).map(|axis| f64::from(truth[axis]).powi(2)).sum(),
+                    after: (0..3).map(|axis| rest(axis).powi(2)).sum(),
+                    held: inside as f64 / bound95.len() as f64,
+                }
+            })
         })
         .collect();
     let mut cells = Vec::new();
@@ -64,6 +80,12 @@ pub(super) fn cells(test: &[Trajectory], estimates: &[Rest]) -> Vec<Cell> {
         cells.push(cell(&by, "negative", rows.iter().filter(|row| way(row) < 0.0)));
         cells.push(cell(&by, "positive", rows.iter().filter(|row| way(row) > 0.0)));
     }
+    for (index, from) in std::iter::once(0.0).chain(PARTS_MIN).enumerate() {
+        let to = PARTS_MIN.get(index).copied().unwrap_or(f64::INFINITY);
+        let name = if to.is_finite() { format!("{from} to {to} min") } else { format!("after {from} min") };
+        let cell = cell(BY_TIME, &name, rows.iter().filter(|row| (from..to).contains(&(row.time_s / 60.0))));
+        cells.extend((cell.rows > 0).then_some(cell));
+    }
     cells
 }
 
@@ -79,12 +101,14 @@ fn thirds(rows: &[Row], by: &str, of: &dyn Fn(&Row) -> f64, names: [&str; 3], ce
 }
 
 fn cell<'a>(by: &str, part: &str, rows: impl Iterator<Item = &'a Row<'a>>) -> Cell {
-    let (mut n, mut before, mut after) = (0, 0.0, 0.0);
+    let (mut n, mut before, mut after, mut held) = (0, 0.0, 0.0, 0.0);
     for row in rows {
         n += 1;
         before += row.before;
         after += row.after;
+        held += row.held;
     }
-    let root = |sum: f64| (sum / f64::from(n).max(1.0)).sqrt();
-    Cell { by: by.to_owned(), part: part.to_owned(), rows: n as usize, before: root(before), after: root(after) }
+    let mean = |sum: f64| sum / f64::from(n).max(1.0);
+    let (before, after, holds) = (mean(before).sqrt(), mean(after).sqrt(), 100.0 * mean(held));
+    Cell { by: by.to_owned(), part: part.to_owned(), rows: n as usize, before, after, holds }
 }

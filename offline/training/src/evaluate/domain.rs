@@ -5,16 +5,15 @@ use crate::card::VALIDATION_RMS;
 use crate::commands::Model;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
-use crate::load;
-use ravenpose::card::Card;
+use crate::load::{self, Weighed};
 use ravenpose::load::LoadCard;
 use std::ops::Range;
 
 /// Inputs named in the report at most.
 const LEAVING: usize = 6;
 
-/// Judges bound and domain on trajectories with the model's estimates.
-pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], names: &[String]) -> Trust {
+/// Judges bound and domain on trajectories with the model's estimates; `card` if the model watches the load.
+pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory], estimates: &[Rest], names: &[String]) -> Trust {
     let numbers = |key: &str| -> Vec<f64> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
     let bound95 = numbers("ravenpose.bound95_mm");
     let mut trust = Trust { bound95, ..Trust::default() };
@@ -50,10 +49,16 @@ pub(super) fn trust(model: &Model, test: &[Trajectory], estimates: &[Rest], name
     if !model.chain.plays.is_empty() {
         trust.settled_after_s = test.iter().map(|one| one.settled_after_s).collect();
     }
-    if let Some(card) = Card::read(&model.card).ok().and_then(|card| card.load) {
-        let flags: Vec<Vec<bool>> = test.iter().map(|one| load::unseen(&card, model.chain.plays.len(), one)).collect();
-        trust.load = Some(observed(&card, model, test, estimates, &trust.bound95, &flags));
-        doubtful.iter_mut().zip(flags.into_iter().flatten()).for_each(|(doubtful, unseen)| *doubtful |= unseen);
+    if let Some(card) = card {
+        let mut admitted = doubtful.iter().map(|doubtful| !doubtful);
+        let weighed = |one: &Trajectory| {
+            let admitted: Vec<bool> = admitted.by_ref().take(one.rows()).collect();
+            load::weigh(card, model.chain.plays.len(), [one], |row| admitted[row])
+        };
+        let weighed: Vec<Weighed> = test.iter().map(weighed).collect();
+        trust.load = Some(observed(card, test, estimates, &trust.bound95, &weighed));
+        let unseen = weighed.iter().flat_map(|one| &one.unseen);
+        doubtful.iter_mut().zip(unseen).for_each(|(doubtful, unseen)| *doubtful |= unseen);
     }
     trust.far_off = model.number(VALIDATION_RMS).map(|rms| far_off(3.0 * rms, test, estimates, &doubtful));
     trust.bound95_unsettled = numbers("ravenpose.bound95_unsettled_mm");
@@ -81,23 +86,22 @@ fn far_off(limit: f64, test: &[Trajectory], estimates: &[Rest], doubtful: &[bool
     FarOff { limit, rows: percent(far.len(), doubtful.len().max(1)), flagged: percent(flagged, far.len()) }
 }
 
-fn observed(card: &LoadCard, model: &Model, test: &[Trajectory], estimates: &[Rest], bound95: &[f64], flags: &[Vec<bool>]) -> Load {
-    let plays = model.chain.plays.len();
+fn observed(card: &LoadCard, test: &[Trajectory], estimates: &[Rest], bound95: &[f64], weighed: &[Weighed]) -> Load {
     let (mut others, mut inside) = (0_usize, 0_usize);
-    for ((one, estimate), flags) in test.iter().zip(estimates).zip(flags) {
-        for ((truth, estimate), _) in rows(one, estimate).zip(flags).filter(|(_, flag)| !**flag) {
+    for ((one, estimate), weighed) in test.iter().zip(estimates).zip(weighed) {
+        for ((truth, estimate), _) in rows(one, estimate).zip(&weighed.unseen).filter(|(_, unseen)| !**unseen) {
             let rests = truth.iter().zip(estimate).map(|(truth, estimate)| f64::from((truth - estimate).abs()));
             others += truth.len();
             inside += rests.zip(bound95).filter(|(rest, bound)| rest <= *bound).count();
         }
     }
-    let first = |(one, flags): (&Trajectory, &Vec<bool>)| Some(one.time_s[flags.iter().position(|flag| *flag)?]);
-    let unseen = flags.iter().flatten().filter(|flag| **flag).count();
+    let first = |(one, weighed): (&Trajectory, &Weighed)| Some(one.time_s[weighed.unseen.iter().position(|unseen| *unseen)?]);
+    let all = || weighed.iter().flat_map(|one| &one.unseen);
     Load {
         limit_kg: f64::from(card.limit_kg),
-        mass_kg: test.iter().filter_map(|one| load::masses(card, plays, one).last().copied()).collect(),
-        unseen_from_s: test.iter().zip(flags).map(first).collect(),
-        unseen: percent(unseen, flags.iter().flatten().count().max(1)),
+        mass_kg: weighed.iter().filter_map(|one| one.mass_kg.last().copied()).collect(),
+        unseen_from_s: test.iter().zip(weighed).map(first).collect(),
+        unseen: percent(all().filter(|unseen| **unseen).count(), all().count().max(1)),
         coverage_of_rest: percent(inside, others),
     }
 }

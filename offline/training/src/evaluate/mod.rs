@@ -10,11 +10,12 @@ use crate::data::{self, Reading, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::rivals;
 use metrics::{AllFigures, Interval, Rest};
+use ravenpose::card::{Card, CardError};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-pub use breakdown::Cell;
+pub use breakdown::{BY_TIME, Cell};
 pub use metrics::{Figures, figures, reductions};
 
 /// What is to be evaluated.
@@ -262,6 +263,12 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             remedy: "give runs that it has not seen",
         });
     }
+    // As the service reads it.
+    let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
+    let card = set.is_raven.then(|| Card::read(&model.card)).transpose().map_err(refused)?;
+    if let Some(card) = &card {
+        card.check_memory(model.chain.plays.len()).map_err(refused)?;
+    }
     let judge = Judge::new(&test, outputs, wish.seed);
     let mut methods = vec![judge.raw(), judge.fixed_offset()];
     told("the model");
@@ -282,6 +289,19 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             methods.push(judge.method(name, what, &found, Some(train_s), Some(estimate_us)));
         }
     }
+    let load = card.as_ref().and_then(|card| card.load.as_ref());
+    let trust = domain::trust(&model, load, &test, &estimates, &set.input_names);
+    let mut notes = set.notes;
+    if let Some(card) = &card {
+        let refused = test.iter().filter(|one| !card.allowed.boards.is_empty() && !card.allowed.boards.contains(&one.board));
+        notes.extend(refused.map(|one| {
+            let (name, board) = (&one.name, one.board);
+            format!(
+                "{name}: is of board {board}, the service would not correct it (state_not_allowed): the model {}",
+                card.limits()
+            )
+        }));
+    }
     let report = Report {
         format: "ravenpose-evaluation/1",
         model: shown(wish.model),
@@ -291,10 +311,10 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         rows: judge.rows(),
         runs_of_training: known,
         methods,
-        trust: domain::trust(&model, &test, &estimates, &set.input_names),
-        breakdown: if set.is_raven { breakdown::cells(&test, &estimates) } else { Vec::new() },
+        breakdown: if set.is_raven { breakdown::cells(&test, &estimates, &trust.bound95) } else { Vec::new() },
+        trust,
         seed: wish.seed,
-        notes: set.notes,
+        notes,
     };
     std::fs::create_dir_all(wish.out)
         .map_err(|error| TrainingError::file(wish.out, format!("cannot be made: {error}"), "choose another --out"))?;

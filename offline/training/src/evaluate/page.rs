@@ -141,13 +141,18 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
 }
 
 fn breakdown(report: &Report) -> Block {
-    let header = ["by", "part", "rows", "RMS before", "RMS after", "removed, %"].map(str::to_owned).to_vec();
+    let header = ["by", "part", "rows", "RMS before", "RMS after", "removed, %", "bound holds, %"].map(str::to_owned).to_vec();
     let rows = report
         .breakdown
         .iter()
         .map(|cell| {
             let removed = if cell.before > 0.0 { 100.0 * (1.0 - cell.after / cell.before) } else { 0.0 };
-            let numbers = [format!("{:.3}", cell.before), format!("{:.3}", cell.after), format!("{removed:.1}")];
+            let numbers = [
+                format!("{:.3}", cell.before),
+                format!("{:.3}", cell.after),
+                format!("{removed:.1}"),
+                format!("{:.1}", cell.holds),
+            ];
             [vec![cell.by.clone(), cell.part.clone(), cell.rows.to_string()], numbers.to_vec()].concat()
         })
         .collect();
