@@ -51,6 +51,12 @@ fn refusal(directory: &TempDir, bytes: &[u8]) -> String {
     load_bytes(directory, bytes).err().expect("a refusal")
 }
 
+/// With this value of `ravenpose.KEY` the model is refused for this problem.
+fn assert_refused(directory: &TempDir, onnx: Onnx, key: &str, value: String, problem: &str) {
+    let key = format!("ravenpose.{key}");
+    assert_eq!(refusal(directory, &onnx.set(&key, value).bytes()), format!("property {key}: {problem}"));
+}
+
 /// Runs `ravenposed --check-config` in 1 GiB of address space and 3 s of processor time: the kernel ends it beyond that.
 fn service(config: &Path) -> Output {
     let script = "ulimit -v 1048576 && ulimit -t 3 && exec timeout -s KILL 120 \"$0\" --config \"$1\" --check-config";
@@ -430,8 +436,7 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
         ("load_information", "1 -2 1".to_owned(), "-2 is not above 0"),
         ("load_limit_kg", "0".to_owned(), "0 is not above 0"),
     ] {
-        let key = format!("ravenpose.{key}");
-        assert_eq!(refusal(&directory, &watching().set(&key, value).bytes()), format!("property {key}: {problem}"));
+        assert_refused(&directory, watching(), key, value, problem);
     }
 }
 
@@ -507,9 +512,7 @@ fn unusable_numbers_are_refused_with_the_property_and_the_problem() {
         ("golden", format!("{} 0 0 zero", with(0, "0")), "\"zero\" is not a number"),
     ];
     for (key, value, problem) in cases {
-        let key = format!("ravenpose.{key}");
-        let line = refusal(&directory, &small().trained().set(&key, value).bytes());
-        assert_eq!(line, format!("property {key}: {problem}"));
+        assert_refused(&directory, small().trained(), key, value, problem);
     }
 }
 

@@ -4,6 +4,7 @@
 //! function of the tip. Neither asks for a run with a load.
 
 use crate::data::Trajectory;
+use crate::rivals::POSTURE;
 use arm::Arm;
 use nalgebra::{DMatrix, DVector};
 use ravenpose::load::{self, LoadCard, LoadObserver, MOTORS, MPOS, MVEL, TAU};
@@ -12,9 +13,6 @@ use std::ops::Range;
 
 /// Features that explain torque, beside the places of a memory and the signs of speeds: tip, joints 1 to 3, motor speeds without slot 3.
 const EXPLAINING: [Range<usize>; 4] = [0..3, 56..59, 64..67, 68..72];
-/// First joint angle, degrees; slot 3 belongs to no joint.
-const JPOS: usize = 56;
-const SLOTS: [usize; 7] = [0, 1, 2, 4, 5, 6, 7];
 /// Share of the mean square that keeps the normal equations solvable where inputs repeat each other.
 const RIDGE: f64 = 1e-6;
 /// An input whose standard deviation is less than this share of its largest size is constant.
@@ -166,7 +164,7 @@ impl<'a> Rows<'a> {
     /// Coefficients of each motor's torque per kg at the tip, in the form of the card.
     fn pull(&self, arm: &Arm) -> Option<[[f32; 4]; MOTORS]> {
         let of = |row: &[f32]| {
-            let joints = SLOTS.map(|slot| f64::from(row[JPOS + slot]).to_radians());
+            let joints = POSTURE.map(|feature| f64::from(row[feature]).to_radians());
             (row[..3].iter().map(|um| f64::from(*um)).collect(), arm.gravity.capstan_torque_per_tip_kg(&joints))
         };
         let found = regress(self.all().map(of))?;
