@@ -11,7 +11,7 @@ use arm::serial::{LinkInertia, PARAMETERS};
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{Candidate, direction};
+use crate::hypothesis::{Candidate, TOOL_LENGTH, TOOL_TWIST, direction};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -188,7 +188,8 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }
         ("link_geometry", form) => {
             let link = joint.ok_or("it has no link")?;
-            Bound::Link(if form == "length" { link + 1 } else { link })
+            // The tool comes after the last link.
+            Bound::Link(if [TOOL_LENGTH, TOOL_TWIST].contains(&form) { link + 1 } else { link })
         }
         ("measurement_delay", "joint encoders") if estimate.coefficients[0] < 0.0 => {
             return Err("the simulator has no late motor positions".to_owned());

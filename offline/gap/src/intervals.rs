@@ -38,11 +38,12 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("stribeck_friction", _) => 0.35,
         ("cable_hysteresis", "z_m") | ("load_dependent_friction", _) => 0.3,
         ("torque_ripple", _) => 0.2,
-        ("payload", "m_p") if form == AT_THE_TIP => 0.2,
+        ("payload", "m_p") if form == AT_THE_TIP => 0.25,
         ("cable_creep", _) => 0.18,
         ("gravity_direction" | "cable_hysteresis", _) => 0.15,
         ("cable_stretch", _) => 0.1,
-        ("payload" | "link_inertia" | "external_contact", _) => 0.06,
+        ("frame_misalignment", _) => 0.12,
+        ("payload" | "link_inertia" | "external_contact", _) => 0.08,
         ("measurement_delay" | "motor_torque_scale", _) => 0.025,
         _ => 0.015,
     }
@@ -60,9 +61,30 @@ fn supposed(physics: &str, form: &str, name: &str) -> f64 {
 fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
     match (physics, named.name) {
         ("motor_torque_scale", "kappa") | ("cable_hysteresis", "a") => named.value - 1.0,
-        ("gravity_direction", _) => rms(all.iter().map(|own| own.value)) * (all.len() as f64).sqrt(),
+        ("gravity_direction" | "frame_misalignment", _) => {
+            let own = || beside(physics, named, all);
+            rms(own().map(|one| one.value)) * (own().count() as f64).sqrt()
+        }
         _ => named.value,
     }
+}
+
+/// The parameters that are one vector with this one.
+fn beside<'a>(physics: &'a str, named: &'a Named, all: &'a [Named]) -> impl Iterator<Item = &'a Named> {
+    let vector = match physics {
+        "gravity_direction" => 0,
+        "frame_misalignment" | "payload" => 2,
+        _ => usize::MAX,
+    };
+    // w_x, w_y and w_z, t_x..., c_x...; a and b.
+    all.iter().filter(move |one| {
+        one.name == named.name || (one.name.len() >= vector && named.name.get(..vector) == one.name.get(..vector))
+    })
+}
+
+/// Standard errors of a 95 % interval of each of so many numbers, all of which are to lie within theirs (Bonferroni).
+fn errors_of_all(numbers: usize) -> f64 {
+    [1.96, 2.24, 2.39][numbers.clamp(1, 3) - 1]
 }
 
 /// What a column of the wide fit is the slope of.
@@ -93,7 +115,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
     }
     let wide = scorer.fit(&grams);
     let blocks = wide.without.len() as f64;
-    let reach = (1.96 + 2.4 / (blocks - 1.0)) * ((blocks - 1.0) / blocks).sqrt();
+    let reach = |numbers: usize| (errors_of_all(numbers) + 2.4 / (blocks - 1.0)) * ((blocks - 1.0) / blocks).sqrt();
     candidates
         .iter()
         .zip(layout)
@@ -125,6 +147,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                 .enumerate()
                 .map(|(k, named)| {
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
+                    let reach = reach(beside(physics, named, &values).count());
                     let half = (reach * spread(&|r| r.0[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
                     (named.clone(), [named.value - half, named.value + half])
                 })
@@ -133,7 +156,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                 [0, 1].map(|edge| {
                     let t = window[edge];
                     // An edge is known to the smoothing at best.
-                    let half = (reach * spread(&|r| r.1[edge])).max(0.02);
+                    let half = (reach(1) * spread(&|r| r.1[edge])).max(0.02);
                     t.is_finite().then_some((t, [t - half, t + half]))
                 })
             });

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::Candidate;
+use crate::hypothesis::{Candidate, TOOL_TWIST};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -48,9 +48,10 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         }
         ("payload", "anywhere on the last link") => {
             let mut all = vec![named("m_p", "kg", theta[0])];
-            all.extend(
-                ["c_x", "c_y", "c_z"].into_iter().zip(&theta[1..]).map(|(name, moment)| named(name, "m", moment / theta[0])),
-            );
+            // What the motion does not show of its place is not told.
+            let places = [("moment_x", "c_x"), ("moment_y", "c_y"), ("moment_z", "c_z")];
+            let at = |moment: &str| candidate.family.shape.iter().position(|name| *name == moment);
+            all.extend(places.iter().filter_map(|(moment, name)| Some(named(name, "m", theta[at(moment)?] / theta[0]))));
             all
         }
         ("payload", _) => {
@@ -113,7 +114,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("phi", "rad", theta[1].atan2(theta[0])),
             named("period", position, shaped("period")),
         ],
-        ("link_geometry", "twist before the joint") => vec![named("d_alpha", "rad", theta[0])],
+        ("link_geometry", "twist before the joint" | TOOL_TWIST) => vec![named("d_alpha", "rad", theta[0])],
         ("link_geometry", _) => vec![named("d_length", "m", theta[0])],
         // Joint encoders that come early against the motors' are motors that come late: nothing is measured ahead of time.
         ("measurement_delay", "joint encoders") => vec![named("d", "s", theta[0].abs())],
@@ -122,14 +123,8 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             all.extend(theta.get(1).map(|drift| named("clock_drift", "s/s", *drift)));
             all
         }
-        ("frame_misalignment", form) => {
-            let turns = ["w_x", "w_y", "w_z"].map(|name| (name, "rad"));
-            let moves = ["t_x", "t_y", "t_z"].map(|name| (name, "m"));
-            let names: Vec<(&'static str, &'static str)> = match form {
-                "moved" => moves.to_vec(),
-                "turned" => turns.to_vec(),
-                _ => turns.into_iter().chain(moves).collect(),
-            };
+        ("frame_misalignment", _) => {
+            let names = [("w_x", "rad"), ("w_y", "rad"), ("w_z", "rad"), ("t_x", "m"), ("t_y", "m"), ("t_z", "m")];
             names.into_iter().zip(theta).map(|((name, unit), value)| named(name, unit, *value)).collect()
         }
         ("external_contact", "steady force") => vec![named("f_max", "N", theta.iter().map(|f| f * f).sum::<f64>().sqrt())],

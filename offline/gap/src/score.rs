@@ -242,6 +242,11 @@ impl<'a> Scorer<'a> {
 
     /// Gain of `better` over `base` on what was held out.
     pub fn gain(&self, base: &Fit, better: &Fit) -> Gain {
+        self.gain_in(base, better, |_| true)
+    }
+
+    /// The same, its error that of the blocks where the difference shows: those where it cannot say nothing of its scatter.
+    pub fn gain_in(&self, base: &Fit, better: &Fit, shows: impl Fn(usize) -> bool) -> Gain {
         let total = |skip: Option<usize>| -> f64 {
             (0..base.held_out.len())
                 .map(|c| {
@@ -258,12 +263,13 @@ impl<'a> Scorer<'a> {
                 })
                 .sum()
         };
-        let blocks = self.problem.block_count;
-        let left: Vec<f64> = (0..blocks).map(|b| total(Some(b))).collect();
-        let mean = left.iter().sum::<f64>() / blocks as f64;
-        let spread: f64 = left.iter().map(|x| (x - mean).powi(2)).sum();
+        let left: Vec<f64> = (0..self.problem.block_count).map(|b| total(Some(b))).collect();
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        Gain { nats: total(None), least, error: ((blocks - 1) as f64 / blocks as f64 * spread).sqrt() }
+        let there: Vec<f64> = left.into_iter().enumerate().filter(|(b, _)| shows(*b)).map(|(_, x)| x).collect();
+        let blocks = there.len().max(1) as f64;
+        let mean = there.iter().sum::<f64>() / blocks;
+        let spread: f64 = there.iter().map(|x| (x - mean).powi(2)).sum();
+        Gain { nats: total(None), least, error: ((blocks - 1.0) / blocks * spread).sqrt() }
     }
 }
 
@@ -274,6 +280,7 @@ pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
         Bound::Free => true,
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
+        Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first),
         Bound::UpTo(times) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * own[before]),
     })
 }

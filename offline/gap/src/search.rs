@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, Window, library, rounds};
+use crate::hypothesis::{Candidate, Dictionary, Family, UNMODELLED, Window, library, rounds};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -38,8 +38,8 @@ const ALWAYS: [&str; 1] = ["stribeck_friction"];
 const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach,
 const SEEN_OFTEN: f64 = 2.0;
-/// but for what is met seldom by its nature: a wall, a load that changes sides.
-const SELDOM: [&str; 2] = ["external_contact", "backlash"];
+/// but for what is met seldom by its nature: a load that changes sides.
+const SELDOM: [&str; 1] = ["backlash"];
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
 const TIP_RESOLUTION: f64 = 2e-6;
 
@@ -50,6 +50,12 @@ fn resolution(channel: Channel) -> f64 {
 
 /// Claims that are tried in windows.
 const CLAIMS_IN_WINDOWS: usize = 14;
+
+/// Forms that are tried in the window of the best claim, between the grid's points: their number, and the share of its score.
+const FORMS_IN_WINDOW: usize = 8;
+const NEAR_IN_WINDOW: f64 = 0.5;
+/// Share of a claim's score by which a form of more numbers has to be better than a simpler one.
+const SAME_FORM: f64 = 0.01;
 
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
@@ -86,7 +92,7 @@ pub struct Effect {
 impl Effect {
     /// Has the vocabulary a name for it?
     pub fn is_named(&self) -> bool {
-        self.chosen.candidate.family.physics != crate::hypothesis::UNMODELLED
+        self.chosen.candidate.family.physics != UNMODELLED
     }
 }
 
@@ -233,12 +239,13 @@ impl Search<'_, '_> {
         };
         let (_, with) = all(&self.scorer);
         let noise = self.noise_left(others, candidate, &self.scorer.fit(&with));
+        let shown = candidate.blocks(self.problem);
         for noise in [window_noise(self.problem), noise] {
             let mut scorer = Scorer::new(self.problem, noise);
             let (base, with) = all(&scorer);
             let (before, after) = (scorer.fit(&base), scorer.fit(&with));
             scorer.temper(&with, &after);
-            let gain = scorer.gain(&before, &after);
+            let gain = scorer.gain_in(&before, &after, |b| shown[b]);
             if best.is_none_or(|b| gain.nats > b.nats) {
                 best = Some(gain);
             }
@@ -366,13 +373,10 @@ impl Search<'_, '_> {
         let best = claims.first().map_or(0.0, |s| s.score);
         let worth = claims.iter_mut().enumerate().filter(|(k, s)| *k < if s.candidate.edges() > 0 { 12 } else { 6 });
         for (_, scored) in worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best) {
-            let candidate = self.refined(grams, &scored.candidate);
-            if let Some(better) = self.score(grams, &base, &candidate)
-                && better.score > scored.score
-            {
-                *scored = better;
-            }
+            self.settle_shape(grams, &base, scored);
         }
+        sort(&mut claims);
+        claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
         claims.retain(|s| !others.iter().any(|other| other.shares_edge(&s.candidate)));
         sort(&mut claims);
@@ -395,6 +399,41 @@ impl Search<'_, '_> {
         self.told_apart(others, &mut claims);
         parsimonious(&mut claims, self.thresholds.equal, self.problem.robot.joint_count() - 1);
         claims
+    }
+
+    /// Everything once more in the window that was found with the best claim: the grid of windows takes each claim in the form
+    /// that fits the whole of the runs best, and some are not tried in windows of their own.
+    fn in_the_window_of_the_first(&self, claims: &[Scored], grams: &Grams, base: &Fit) -> Vec<Scored> {
+        let best = claims.first().filter(|best| best.score > self.thresholds.nats);
+        let Some((best, window)) = best.and_then(|best| Some((best, best.candidate.window?))) else { return Vec::new() };
+        let mut forms = best_of(self.candidates.len(), Candidate::same_form, &|k| {
+            let candidate = self.candidates[k].within(self.problem, window);
+            if candidate.shows() { self.score(grams, base, &candidate) } else { None }
+        });
+        sort(&mut forms);
+        let mut forms = distinct_by(&forms, Candidate::same_form);
+        forms.retain(|s| s.score > NEAR_IN_WINDOW * best.score);
+        forms.truncate(FORMS_IN_WINDOW);
+        for scored in &mut forms {
+            self.settle_shape(grams, base, scored);
+        }
+        // A form of the same claim that fits fewer numbers is enough where it does as well.
+        let enough = |form: &Scored| {
+            let simpler = |other: &&Scored| complexity(&other.candidate) < complexity(&form.candidate);
+            let mut same = claims.iter().chain(&forms).filter(|other| other.candidate.same_claim(&form.candidate)).filter(simpler);
+            same.any(|other| other.score >= (1.0 - SAME_FORM) * form.score)
+        };
+        forms.iter().filter(|form| !enough(form)).cloned().collect()
+    }
+
+    /// Moves a candidate between the grid's points, where that is better.
+    fn settle_shape(&self, grams: &Grams, base: &Fit, scored: &mut Scored) {
+        let candidate = self.refined(grams, &scored.candidate);
+        if let Some(better) = self.score(grams, base, &candidate)
+            && better.score > scored.score
+        {
+            *scored = better;
+        }
     }
 
     /// The first claims, where they are close to each other, in the order of their gain over the noise that the best of them
@@ -456,17 +495,24 @@ fn price(candidate: &Candidate) -> f64 {
     candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
 }
 
-/// A claim that holds another one and more, and the share of its score by which it has to be better.
-const HOLDS: (&str, &str, f64) = ("link_inertia", "payload", 0.03);
+/// Claims that hold another one and more, and the share of its score by which they have to be better.
+const HOLDS: [(&str, &str, f64); 2] = [("link_inertia", "payload", 0.03), (UNMODELLED, "cable_stretch", 0.02)];
+
+/// The share by which a claim has to be better than one that it holds; none where it holds it not.
+fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
+    // A payload hangs on the last link.
+    let place = |joints: &[usize]| if joints.is_empty() { vec![last_link] } else { joints.to_vec() };
+    let physics = (one.family.physics, other.family.physics);
+    let (_, _, share) = HOLDS.into_iter().find(|(larger, smaller, _)| physics == (*larger, *smaller))?;
+    (place(&one.family.joints) == place(&other.family.joints)).then_some(share)
+}
 
 /// Brings the simplest of those that are as good as the best to the front.
 fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
     let Some(best) = claims.first() else { return };
     let score = best.score;
-    // A payload hangs on the last link.
-    let held = best.candidate.family.physics == HOLDS.0 && best.candidate.family.joints == [last_link];
     let good = |claim: &Scored| {
-        let share = if held && claim.candidate.family.physics == HOLDS.1 { HOLDS.2 } else { equal };
+        let share = held(&best.candidate, &claim.candidate, last_link).unwrap_or(equal);
         claim.score >= score - (share * score.abs()).max(3.0)
     };
     let simplest = (0..claims.len())
@@ -475,10 +521,16 @@ fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
     if let Some(k) = simplest {
         claims[..=k].rotate_right(1);
     }
+    // Of what was taken for simpler, the part may be enough.
+    let Some(part) = claims.iter().position(|c| held(&claims[0].candidate, &c.candidate, last_link).is_some()) else { return };
+    let share = held(&claims[0].candidate, &claims[part].candidate, last_link).unwrap_or(0.0);
+    if claims[part].score >= claims[0].score - (share * claims[0].score.abs()).max(3.0) {
+        claims[..=part].rotate_right(1);
+    }
 }
 
 /// Numbers that a candidate fits, and between equals what is less usual.
-fn complexity(candidate: &Candidate) -> f64 {
+pub(crate) fn complexity(candidate: &Candidate) -> f64 {
     let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
     // What rounds a sign is not a claim of its own.
     let rounding = candidate.family.shape.iter().filter(|name| rounds(name)).count();
@@ -491,9 +543,13 @@ fn sort(all: &mut [Scored]) {
 
 /// The first of every claim.
 fn distinct(sorted: &[Scored]) -> Vec<Scored> {
+    distinct_by(sorted, Candidate::same_claim)
+}
+
+fn distinct_by(sorted: &[Scored], same: fn(&Candidate, &Candidate) -> bool) -> Vec<Scored> {
     let mut out: Vec<Scored> = Vec::new();
     for scored in sorted {
-        if !out.iter().any(|o| o.candidate.same_claim(&scored.candidate)) {
+        if !out.iter().any(|o| same(&o.candidate, &scored.candidate)) {
             out.push(scored.clone());
         }
     }
@@ -503,11 +559,20 @@ fn distinct(sorted: &[Scored]) -> Vec<Scored> {
 /// The best of every claim among so many candidates, by score and by what is seen; the first of equals. What loses is dropped
 /// at once: with its columns it would take as much memory as the whole library.
 fn best_claims(count: usize, score: &(dyn Fn(usize) -> Option<Scored> + Sync)) -> Vec<Scored> {
+    best_of(count, Candidate::same_claim, score)
+}
+
+/// The same of every kind of candidate: of those that are the same.
+fn best_of(
+    count: usize,
+    same: fn(&Candidate, &Candidate) -> bool,
+    score: &(dyn Fn(usize) -> Option<Scored> + Sync),
+) -> Vec<Scored> {
     let best = |range: std::ops::Range<usize>| {
         let (mut by_score, mut by_seen) = (Vec::new(), Vec::new());
         for scored in range.filter_map(score) {
-            keep_better(&mut by_score, &scored, |s| s.score);
-            keep_better(&mut by_seen, &scored, |s| s.seen);
+            keep_better(&mut by_score, &scored, same, |s| s.score);
+            keep_better(&mut by_seen, &scored, same, |s| s.seen);
         }
         by_score.extend(by_seen);
         by_score
@@ -521,8 +586,8 @@ fn best_claims(count: usize, score: &(dyn Fn(usize) -> Option<Scored> + Sync)) -
 }
 
 /// Takes a candidate in place of the one that says the same, if it is better.
-fn keep_better(all: &mut Vec<Scored>, scored: &Scored, value: impl Fn(&Scored) -> f64) {
-    match all.iter_mut().find(|other| other.candidate.same_claim(&scored.candidate)) {
+fn keep_better(all: &mut Vec<Scored>, scored: &Scored, same: fn(&Candidate, &Candidate) -> bool, value: impl Fn(&Scored) -> f64) {
+    match all.iter_mut().find(|other| same(&other.candidate, &scored.candidate)) {
         Some(other) if value(scored) > value(other) => *other = scored.clone(),
         Some(_) => {}
         None => all.push(scored.clone()),

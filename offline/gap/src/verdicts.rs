@@ -19,7 +19,7 @@ use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
-use crate::search::{Effect, Scored};
+use crate::search::{Effect, Scored, complexity};
 use crate::seldom::Seldom;
 use crate::{experiment, regime};
 
@@ -256,10 +256,20 @@ fn weight(best: f64, score: f64) -> f64 {
     ((score - best) / (2.0_f64).max(0.01 * best)).exp()
 }
 
+/// What each number that a rival fits beyond the claim's own takes off its weight, nats: of claims that predict alike the
+/// simplest was right so much more often (docs/proof.md, stated and observed probability).
+const NATS_PER_NUMBER: f64 = 1.5;
+
+/// Weight of a rival beside the claim that was chosen, whose own is 1.
+fn weight_beside(chosen: &Scored, rival: &Scored) -> f64 {
+    let more = (complexity(&rival.candidate) - complexity(&chosen.candidate)).max(0.0);
+    weight(chosen.score, rival.score) * (-NATS_PER_NUMBER * more).exp()
+}
+
 /// Weight of an effect, of its rivals and of none of them together.
 fn total_weight(effect: &Effect) -> f64 {
-    let best = effect.chosen.score;
-    weight(best, best) + effect.rivals.iter().map(|r| weight(best, r.score)).sum::<f64>() + weight(best, 0.0)
+    let chosen = &effect.chosen;
+    1.0 + effect.rivals.iter().map(|r| weight_beside(chosen, r)).sum::<f64>() + weight(chosen.score, 0.0)
 }
 
 /// The primary verdict of an effect and its alternatives.
@@ -270,7 +280,7 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let named = |r: &&Scored| r.candidate.family.physics != UNMODELLED;
     let close: Vec<&Scored> = effect.rivals.iter().filter(named).filter(|r| r.score > best - near).take(4).collect();
     let total = total_weight(effect);
-    let probability = weight(best, best) / total;
+    let probability = 1.0 / total;
     let candidate = &effect.chosen.candidate;
     let physics = physics(candidate);
     let location = location(found, candidate, estimate, effect.share);
@@ -304,32 +314,40 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
                 one
             })
             .collect();
-        let set = probability + close.iter().map(|r| weight(best, r.score) / total).sum::<f64>();
+        let set = probability + close.iter().map(|r| weight_beside(&effect.chosen, r) / total).sum::<f64>();
         let rivals: Vec<Physics> = std::iter::once(physics).chain(close.iter().map(|r| self::physics(&r.candidate))).collect();
         verdict = verdict.confusable(with, set.min(1.0), experiment::suggest(found.robot, candidate, &close, rivals));
     }
     verdict.summary = Some(gap_report::headline(&verdict));
-    let alternatives = effect.rivals.iter().filter(named).take(3).filter(|r| weight(best, r.score) / total > 0.005).map(|rival| {
-        let place = Location::new(
-            told(rival.candidate.family.channel),
-            joints(found.robot, &rival.candidate),
-            regime::subsystem(&rival.candidate),
-            regime::regime(&rival.candidate),
-        );
-        let numbers = crate::parameters::parameters(
-            found.robot,
-            found.nominal,
-            &rival.candidate,
-            &rival.coefficients,
-            &rival.candidate.shape,
-        );
-        let numbers = numbers
-            .into_iter()
-            .filter(|n| n.value.is_finite())
-            .map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value]))
-            .collect();
-        Verdict::alternative(number, self::physics(&rival.candidate), weight(best, rival.score) / total, place, numbers, Vec::new())
-    });
+    let alternatives =
+        effect.rivals.iter().filter(named).take(3).filter(|r| weight_beside(&effect.chosen, r) / total > 0.005).map(|rival| {
+            let place = Location::new(
+                told(rival.candidate.family.channel),
+                joints(found.robot, &rival.candidate),
+                regime::subsystem(&rival.candidate),
+                regime::regime(&rival.candidate),
+            );
+            let numbers = crate::parameters::parameters(
+                found.robot,
+                found.nominal,
+                &rival.candidate,
+                &rival.coefficients,
+                &rival.candidate.shape,
+            );
+            let numbers = numbers
+                .into_iter()
+                .filter(|n| n.value.is_finite())
+                .map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value]))
+                .collect();
+            Verdict::alternative(
+                number,
+                self::physics(&rival.candidate),
+                weight_beside(&effect.chosen, rival) / total,
+                place,
+                numbers,
+                Vec::new(),
+            )
+        });
     std::iter::once(verdict).chain(alternatives.collect::<Vec<_>>()).collect()
 }
 
@@ -531,12 +549,11 @@ fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Ver
     let regime = Regime::new(Feature::All, format!("depends on {}", candidate.family.form));
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), Subsystem::Unknown, regime);
     location.energy_share = Some(effect.share.clamp(0.0, 1.0));
-    let best = effect.chosen.score;
     let total = total_weight(effect);
     let claim = format!("a term in {} explains more than every physics that has a name", candidate.family.form);
     let evidence =
         Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
-    Verdict::unmodelled(k as u64 + 1, (weight(best, best) / total).clamp(0.01, 0.999), location, evidence)
+    Verdict::unmodelled(k as u64 + 1, (1.0 / total).clamp(0.01, 0.999), location, evidence)
 }
 
 fn remaining(found: &Found) -> Remaining {

@@ -46,6 +46,47 @@ fn friction_that_falls_with_speed_is_not_taken_for_plain_friction() {
 }
 
 #[test]
+fn friction_that_falls_with_speed_is_named_where_it_ends_on_the_way() {
+    let folder = Folder::new("stribeck-ends");
+    let curve = [("f_c", 6.1), ("f_s", 12.0), ("v_s", 0.02), ("a", 1.5)];
+    let ends = Wanted { interval: Some([-120.0, 7.0]), ..wanted("stribeck_friction", Some(3), &curve) };
+    let (case, truth) = made(&folder, "stribeck-ends", &[ends], 12.0);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "stribeck_friction", truth[0].joint_name.as_ref().expect("a joint"));
+    assert!(!first.location.time_intervals.is_empty(), "{}", report.summary);
+    for interval in &first.location.time_intervals {
+        assert!((interval.end_s - 7.0).abs() < 0.2, "{} s", interval.end_s);
+    }
+}
+
+#[test]
+fn a_force_for_a_while_is_no_weight() {
+    let folder = Folder::new("force");
+    let along = [("n_x", 0.6), ("n_y", -0.8), ("n_z", 0.0)].map(|(name, value)| (name.to_owned(), value));
+    let force = Wanted {
+        details: along.into_iter().collect(),
+        interval: Some([4.0, 8.0]),
+        ..wanted("external_contact", None, &[("f_max", 5.0)])
+    };
+    // Walls and steady forces are drawn.
+    let (case, truth) = made(&folder, "f2", &[force], 12.0);
+    assert!(!truth[0].effect.parameters.contains_key("k"), "{:?}", truth[0].effect.parameters);
+    let report = case.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "external_contact", "{}", report.summary);
+    near(first, "f_max", 5.0, 0.1);
+}
+
+#[test]
+fn a_tool_that_is_turned_is_told_from_a_camera_that_is() {
+    let folder = Folder::new("twist");
+    let (case, truth) = made(&folder, "twist", &[wanted("link_geometry", Some(3), &[("d_alpha", 0.03)])], 12.0);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "link_geometry", truth[0].joint_name.as_ref().expect("a joint"));
+    near(first, "d_alpha", 0.03, 0.1);
+}
+
+#[test]
 fn a_tip_that_comes_late_from_the_middle_of_the_runs_on_is_seen() {
     let folder = Folder::new("late");
     let late = Wanted {

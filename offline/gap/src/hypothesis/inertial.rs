@@ -44,16 +44,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         move |d, s| vec![point_column(d, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
     );
     all.push(somewhere.stepped(&[None, Some(0.04), Some(0.04), Some(0.04)]).penalised(3.0));
-    // Mass and first moment free; its second moments are those of a point where the two put it.
-    let bounds = [Bound::Positive, Bound::Free, Bound::Free, Bound::Free];
-    let moments = ["mass", "moment_x", "moment_y", "moment_z"];
-    let anywhere = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &moments, move |d, s| {
-        let place = if s[0] > 0.0 { Vector3::new(s[1], s[2], s[3]) / s[0] } else { Vector3::zeros() };
-        let mut of_mass = LinkInertia::point(1.0, place).parameters();
-        of_mass[1..4].fill(0.0);
-        std::iter::once(weighted_column(d, last, &of_mass)).chain((1..4).map(|k| parameter_column(d, last, k))).collect()
-    });
-    all.push(anywhere.penalised(3.0));
+    all.extend(anywhere(dictionary, last, tip.norm() + BEYOND_THE_TIP_M));
     // The links of one robot are the same in two recordings of it.
     let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
@@ -67,7 +58,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             );
         }
         // The parameter that the motion shows best comes first, and is the one that is reported.
-        let free = independent(dictionary, link);
+        let free = independent(dictionary, link, &EVERY);
         let Some(first) = free.first().map(|k| *k as f64) else { continue };
         let bounds = vec![Bound::Free; free.len()];
         let family = Family::shaped(
@@ -86,6 +77,36 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 }
 
 const TORQUE: Channel = Channel::JointTorque;
+/// How much further than the tip a payload may be from the frame of its link, m.
+const BEYOND_THE_TIP_M: f64 = 0.25;
+/// Share of a parameter's torque that no other one gives, from which it is told apart.
+const TOLD_APART: f64 = 0.1;
+/// Every parameter of a link: mass, first moments, second moments.
+const EVERY: [usize; PARAMETERS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
+
+/// Mass and first moment free, as far as the motion shows them; its second moments are those of a point where the two put it.
+/// A weight that is out of reach is another link's number, or a force.
+fn anywhere(dictionary: &Dictionary, link: usize, reach: f64) -> Option<Family> {
+    let seen = independent(dictionary, link, &EVERY[..4]);
+    if !seen.contains(&0) {
+        return None;
+    }
+    let moments: Vec<usize> = (1..4).filter(|k| seen.contains(k)).collect();
+    let names = ["mass", "moment_x", "moment_y", "moment_z"];
+    let shape: Vec<&'static str> = std::iter::once(0).chain(moments.iter().copied()).map(|k| names[k]).collect();
+    let mut bounds = vec![Bound::Within(reach); shape.len()];
+    bounds[0] = Bound::Positive;
+    let family = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &shape, move |d, s| {
+        let mut place = Vector3::zeros();
+        if s[0] > 0.0 {
+            moments.iter().zip(&s[1..]).for_each(|(k, moment)| place[k - 1] = moment / s[0]);
+        }
+        let mut of_mass = LinkInertia::point(1.0, place).parameters();
+        of_mass[1..4].fill(0.0);
+        std::iter::once(weighted_column(d, link, &of_mass)).chain(moments.iter().map(|k| parameter_column(d, link, *k))).collect()
+    });
+    Some(family.penalised(3.0))
+}
 
 /// The torque of a set of parameters of one link.
 fn weighted_column(dictionary: &Dictionary, link: usize, parameters: &[f64; PARAMETERS]) -> super::Column {
@@ -113,8 +134,8 @@ fn point_column(dictionary: &Dictionary, link: usize, point: &Vector3<f64>) -> s
     weighted_column(dictionary, link, &LinkInertia::point(1.0, *point).parameters())
 }
 
-/// Parameters of a link that the motion tells apart, most visible first (pivoted Gram-Schmidt).
-fn independent(dictionary: &Dictionary, link: usize) -> Vec<usize> {
+/// Parameters of a link, of some of them, that the motion tells apart, most visible first (pivoted Gram-Schmidt).
+fn independent(dictionary: &Dictionary, link: usize, among: &[usize]) -> Vec<usize> {
     let n = dictionary.joints();
     let regressor = dictionary.regressor();
     let rows = regressor.len() * (link + 1);
@@ -123,15 +144,9 @@ fn independent(dictionary: &Dictionary, link: usize) -> Vec<usize> {
     });
     let first: Vec<f64> = (0..PARAMETERS).map(|k| a.column(k).norm().max(1e-12)).collect();
     let mut chosen = Vec::new();
-    while chosen.len() < 6 {
-        let (k, share) = (0..PARAMETERS)
-            .filter(|k| !chosen.contains(k))
-            .map(|k| (k, a.column(k).norm() / first[k]))
-            .max_by(|x, y| x.1.total_cmp(&y.1))
-            .expect("ten parameters");
-        if share < 0.2 {
-            break;
-        }
+    loop {
+        let left = among.iter().copied().filter(|k| !chosen.contains(k)).map(|k| (k, a.column(k).norm() / first[k]));
+        let Some((k, _)) = left.filter(|(_, share)| *share >= TOLD_APART).max_by(|x, y| x.1.total_cmp(&y.1)) else { break };
         chosen.push(k);
         let unit = a.column(k) / a.column(k).norm();
         for other in 0..PARAMETERS {

@@ -8,6 +8,12 @@ use super::{Bound, Column, Family};
 use crate::problem::Channel;
 
 const TIP: Channel = Channel::EndEffector;
+/// The form of a tool that is turned about the last link's x.
+pub(crate) const TOOL_TWIST: &str = "twist of the tool";
+/// The form of a tool that is longer.
+pub(crate) const TOOL_LENGTH: &str = "length";
+/// Turn from which derivatives are taken, rad.
+const TURN: f64 = 1e-4;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if dictionary.tip_rows.is_empty() {
@@ -17,7 +23,6 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let small = Bound::Between(-0.2, 0.2);
     for link in 0..dictionary.joints() {
         all.push(Family::fixed("link_geometry", &[link], "twist before the joint", TIP, &[small], move |d| {
-            const TURN: f64 = 1e-4;
             let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
             vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| turn * placement), TURN)]
         }));
@@ -33,7 +38,9 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         }
     }
     let last = dictionary.joints() - 1;
-    all.push(Family::fixed("link_geometry", &[last], "length", TIP, &[small], longer));
+    all.push(Family::fixed("link_geometry", &[last], TOOL_LENGTH, TIP, &[small], longer));
+    all.push(Family::fixed("link_geometry", &[last], TOOL_TWIST, TIP, &[small], twisted));
+    // Always both: what a frame that is only moved or only turned would say of the other is that it is known to be nothing.
     let turned = Bound::Between(-0.9, 0.9);
     let moves = move |d: &Dictionary| axes.map(|axis| d.tip(|_, _, _| axis.into()));
     let free = Bound::Free;
@@ -54,8 +61,6 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         )
         .penalised(1.0),
     );
-    all.push(Family::fixed("frame_misalignment", &[], "moved", TIP, &[free; 3], move |d| moves(d).to_vec()));
-    all.push(Family::secant("frame_misalignment", &[], "turned", TIP, &[turned; 3], &turns, turning));
 }
 
 /// `Exp(w) p - p`, one secant for each number of w.
@@ -72,6 +77,13 @@ fn longer(dictionary: &Dictionary) -> Vec<Column> {
     let arm = &dictionary.problem.robot.arm;
     let step = Translation3::from(tool_axis(arm) * STEP);
     vec![derivative(dictionary, &rebuilt(arm, arm.bodies().to_vec(), step * arm.tool_pose()), STEP)]
+}
+
+/// The tool turned about x of the last link.
+fn twisted(dictionary: &Dictionary) -> Vec<Column> {
+    let arm = &dictionary.problem.robot.arm;
+    let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
+    vec![derivative(dictionary, &rebuilt(arm, arm.bodies().to_vec(), turn * arm.tool_pose()), TURN)]
 }
 
 /// Direction in which the tool is long, in the last link.

@@ -17,6 +17,7 @@ use std::sync::Arc;
 pub use dictionary::{Column, Dictionary, Window};
 pub use environment::direction;
 pub(crate) use inertial::AT_THE_TIP;
+pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST};
 
 use crate::problem::Channel;
 
@@ -31,6 +32,8 @@ pub enum Bound {
     Between(f64, f64),
     /// Positive, and at most so many times the coefficient before.
     UpTo(f64),
+    /// At most so many times the first coefficient, of either sign.
+    Within(f64),
 }
 
 /// Columns for a shape.
@@ -234,6 +237,17 @@ impl Candidate {
         crate::nominal::rms(self.effect(cell, coefficients).into_iter())
     }
 
+    /// Of each block, whether it shows there.
+    pub fn blocks(&self, problem: &crate::problem::Problem) -> Vec<bool> {
+        let mut shows = vec![false; problem.block_count];
+        for (c, values) in self.columns.iter().flat_map(|column| &column.parts) {
+            for (block, _) in problem.blocks[*c].iter().zip(values).filter(|(_, x)| **x != 0.0) {
+                shows[*block] = true;
+            }
+        }
+        shows
+    }
+
     /// Does every coefficient reach some residual?
     pub fn shows(&self) -> bool {
         !self.columns.is_empty() && self.columns.iter().all(|column| !column.is_empty())
@@ -248,6 +262,11 @@ impl Candidate {
     /// Are the two of the same form and shape?
     pub fn same_start(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.family, &other.family) && self.shape == other.shape
+    }
+
+    /// Are the two of the same form?
+    pub fn same_form(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.family, &other.family)
     }
 
     /// Do the two say the same physics at the same place?
