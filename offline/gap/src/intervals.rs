@@ -36,15 +36,15 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("cable_hysteresis", "n" | "g") => 0.6,
         ("thermal_drift", _) => 0.45,
         ("stribeck_friction", _) => 0.35,
-        ("cable_hysteresis", "z_m") | ("load_dependent_friction", _) => 0.3,
-        ("torque_ripple", _) => 0.2,
+        ("cable_hysteresis", "z_m") | ("load_dependent_friction" | "torque_ripple", _) => 0.3,
         ("payload", "m_p") if form == AT_THE_TIP => 0.25,
         ("cable_creep", _) => 0.18,
         ("gravity_direction" | "cable_hysteresis", _) => 0.15,
         ("cable_stretch", _) => 0.1,
         ("frame_misalignment", _) => 0.12,
         ("payload" | "link_inertia" | "external_contact", _) => 0.08,
-        ("measurement_delay" | "motor_torque_scale", _) => 0.025,
+        ("measurement_delay" | "link_geometry", _) => 0.05,
+        ("motor_torque_scale", _) => 0.025,
         _ => 0.015,
     }
 }

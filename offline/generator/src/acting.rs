@@ -1,6 +1,6 @@
 //! Effects as the plant meets them: names turned into numbers once, before the first step.
 
-use crate::arm::{Arm, GRAVITY, rotation};
+use crate::arm::Arm;
 use crate::effect::Effect;
 use crate::friction::Brake;
 use nalgebra::{Rotation3, Vector3};
@@ -110,10 +110,7 @@ impl Acting {
             "joint_offset" => Act::Offset(v("o")),
             "pulley_eccentricity" => Act::Eccentric([v("e_over_r"), v("period"), v("phi")]),
             "payload" => Act::Payload(v("m_p"), Vector3::new(v("c_x"), v("c_y"), v("c_z"))),
-            "gravity_direction" => {
-                let turned = Rotation3::new(Vector3::new(v("a"), v("b"), 0.0)) * GRAVITY;
-                Act::Gravity(rotation(arm.mount).transpose() * turned)
-            }
+            "gravity_direction" => Act::Gravity(Rotation3::new(Vector3::new(v("a"), v("b"), 0.0)) * arm.gravity()),
             "link_inertia" => Act::Link {
                 mass: v("mass_factor"),
                 shift: Vector3::new(v("shift_x"), v("shift_y"), v("shift_z")),
