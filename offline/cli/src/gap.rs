@@ -1,5 +1,7 @@
 //! `ravenpose gap`: where simulation and recordings differ, and which physics is missing.
 
+mod live;
+
 use crate::output;
 use ::gap::analysis::{Given, Options, Outcome, analyse};
 use ::gap::needed::keep_needed;
@@ -32,8 +34,10 @@ pub(crate) struct Wish<'a> {
     pub(crate) seed: u64,
     /// Say what the search tries.
     pub(crate) trace: bool,
-    /// Look at the newest minute of one recording again and again.
+    /// Look at the newest minute of one recording, or of the running service, again and again.
     pub(crate) watch: bool,
+    /// End of a watch of the running service, s.
+    pub(crate) seconds: Option<f64>,
 }
 
 /// Progress is shown on a terminal, and only of what takes longer.
@@ -73,6 +77,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         config_sha256: sha256(format!("{text}{thresholds:?}{}", wish.seed).as_bytes()),
         urdf_sha256: urdf.map(|path| hash(Path::new(path))).transpose()?,
     };
+    if wish.watch && wish.real.is_empty() {
+        return live::watch(&model, &options, wish);
+    }
     if wish.watch {
         let [only] = given.as_slice() else { return Err("--watch looks at one recording; give one --real".to_owned()) };
         return watched(&model, only, &options, wish.out);
@@ -93,6 +100,10 @@ fn status(status: Status) -> ExitCode {
         Status::InsufficientData => ExitCode::from(2),
         _ => ExitCode::from(1),
     }
+}
+
+fn differs(outcome: &Outcome) -> bool {
+    !matches!(outcome.report.status, Status::NoMismatch | Status::InsufficientData)
 }
 
 /// The analysis with its progress on a terminal.
@@ -137,7 +148,6 @@ fn watched(model: &RobotModel, given: &Given, options: &Options, out: &Path) -> 
         if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {}\n", gap_report::headlines(&outcome.report).join(" "))) {
             break;
         }
-        let differs = |outcome: &Outcome| !matches!(outcome.report.status, Status::NoMismatch | Status::InsufficientData);
         if differs(&outcome) || !told.as_ref().is_some_and(differs) {
             told = Some(outcome);
         }
@@ -156,7 +166,7 @@ fn read(path: &Path, side: Side, notes: &mut Vec<String>) -> Result<Recording, S
     }
     let mut source = states_or_table(path, None)?;
     if source.columns().iter().any(|column| column.name.starts_with("green_")) {
-        source = states_or_table(path, Some(if side == Side::Green { Arms::Green } else { Arms::Gold }))?;
+        source = states_or_table(path, Some(arms_of(side)))?;
         notes.push(format!("{}: holds both arms; the {} one is looked at", path.display(), side.name()));
     }
     let recording = table::collect(&path.display().to_string(), source.as_mut()).map_err(|error| error.to_string())?;
@@ -164,6 +174,10 @@ fn read(path: &Path, side: Side, notes: &mut Vec<String>) -> Result<Recording, S
         notes.push(format!("{}: {}: {}: what stands before it is used", path.display(), damage.place, damage.what));
     }
     Ok(recording)
+}
+
+fn arms_of(side: Side) -> Arms {
+    if side == Side::Green { Arms::Green } else { Arms::Gold }
 }
 
 fn states_or_table(path: &Path, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {

@@ -109,7 +109,7 @@ enum Command {
     /// Where a simulation and recordings differ, which physics is missing, how large it is, and the model with it
     Gap {
         /// Recordings of one robot, one file per run
-        #[arg(long, required = true, num_args = 1..)]
+        #[arg(long, required_unless_present = "watch", num_args = 1..)]
         real: Vec<PathBuf>,
         /// What a simulator made of the same commands, in the same order; without it the robot's model stands for it
         #[arg(long, num_args = 1..)]
@@ -126,9 +126,13 @@ enum Command {
         /// Say on standard error what the search tries
         #[arg(long)]
         trace: bool,
-        /// Go through one recording as it came, a minute at a time, and say when the robot no longer is its model
+        /// Say when the robot no longer is its model, from the newest minute: of one recording as it came, or, without --real, of
+        /// what the running service's controller publishes, until Ctrl-C
         #[arg(long)]
         watch: bool,
+        /// With --watch and without --real: stop by itself after so many seconds
+        #[arg(long, requires = "watch", conflicts_with = "real")]
+        seconds: Option<f64>,
     },
     /// Concealed-truth trials of `gap`: recordings with sealed causes, answers, score; stopped, it goes on where it was
     Prove {
@@ -245,8 +249,8 @@ fn main() -> ExitCode {
             same,
             offset_s,
         }),
-        Command::Gap { real, sim, robot, out, seed, trace, watch } => {
-            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch })
+        Command::Gap { real, sim, robot, out, seed, trace, watch, seconds } => {
+            gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch, seconds })
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds, webcams } => record::run(&out, seconds, &webcams),

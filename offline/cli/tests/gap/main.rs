@@ -5,6 +5,7 @@ mod common;
 mod document;
 mod examples;
 mod gaps;
+mod live;
 mod made;
 #[path = "../common/mod.rs"]
 mod program;

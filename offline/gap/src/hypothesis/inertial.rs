@@ -44,7 +44,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         move |d, s| vec![point_column(d, s[0] as usize, &Vector3::new(s[1], s[2], s[3]))],
     );
     all.push(somewhere.stepped(&[None, Some(0.04), Some(0.04), Some(0.04)]).penalised(3.0));
-    all.extend(anywhere(dictionary, last, tip.norm() + BEYOND_THE_TIP_M));
+    all.extend(anywhere(dictionary, last, &tip));
     // The links of one robot are the same in two recordings of it.
     let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
@@ -86,7 +86,7 @@ const EVERY: [usize; PARAMETERS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
 
 /// Mass and first moment free, as far as the motion shows them; its second moments are those of a point where the two put it.
 /// A weight that is out of reach is another link's number, or a force.
-fn anywhere(dictionary: &Dictionary, link: usize, reach: f64) -> Option<Family> {
+fn anywhere(dictionary: &Dictionary, link: usize, tip: &Vector3<f64>) -> Option<Family> {
     let seen = independent(dictionary, link, &EVERY[..4]);
     if !seen.contains(&0) {
         return None;
@@ -94,9 +94,11 @@ fn anywhere(dictionary: &Dictionary, link: usize, reach: f64) -> Option<Family> 
     let moments: Vec<usize> = (1..4).filter(|k| seen.contains(k)).collect();
     let names = ["mass", "moment_x", "moment_y", "moment_z"];
     let shape: Vec<&'static str> = std::iter::once(0).chain(moments.iter().copied()).map(|k| names[k]).collect();
-    let mut bounds = vec![Bound::Within(reach); shape.len()];
+    // To begin with its second moments are those of a weight at the tip, or none.
+    let start: Vec<f64> = std::iter::once(1.0).chain(moments.iter().map(|k| tip[k - 1])).collect();
+    let mut bounds = vec![Bound::Within(tip.norm() + BEYOND_THE_TIP_M); shape.len()];
     bounds[0] = Bound::Positive;
-    let family = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &shape, move |d, s| {
+    let mut family = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &shape, move |d, s| {
         let mut place = Vector3::zeros();
         if s[0] > 0.0 {
             moments.iter().zip(&s[1..]).for_each(|(k, moment)| place[k - 1] = moment / s[0]);
@@ -105,6 +107,7 @@ fn anywhere(dictionary: &Dictionary, link: usize, reach: f64) -> Option<Family> 
         of_mass[1..4].fill(0.0);
         std::iter::once(weighted_column(d, link, &of_mass)).chain(moments.iter().map(|k| parameter_column(d, link, *k))).collect()
     });
+    family.grid.push(start);
     Some(family.penalised(3.0))
 }
 
