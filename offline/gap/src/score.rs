@@ -266,10 +266,13 @@ impl<'a> Scorer<'a> {
         let left: Vec<f64> = (0..self.problem.block_count).map(|b| total(Some(b))).collect();
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
         let there: Vec<f64> = left.into_iter().enumerate().filter(|(b, _)| shows(*b)).map(|(_, x)| x).collect();
-        let blocks = there.len().max(1) as f64;
-        let mean = there.iter().sum::<f64>() / blocks;
+        // Of a sum over blocks; one block alone says nothing of it.
+        let blocks = there.len() as f64;
+        let mean = there.iter().sum::<f64>() / blocks.max(1.0);
         let spread: f64 = there.iter().map(|x| (x - mean).powi(2)).sum();
-        Gain { nats: total(None), least, error: ((blocks - 1.0) / blocks * spread).sqrt() }
+        let nats = total(None);
+        let error = if there.len() > 1 { (blocks / (blocks - 1.0) * spread).sqrt() } else { nats.abs() };
+        Gain { nats, error, least }
     }
 }
 
@@ -280,7 +283,7 @@ pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
         Bound::Free => true,
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
-        Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first),
+        Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first.abs()),
         Bound::UpTo(times) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * own[before]),
     })
 }

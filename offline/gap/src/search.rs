@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, UNMODELLED, Window, library, rounds};
+use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, UNMODELLED, WALL, Window, library, rounds};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -38,8 +38,8 @@ const ALWAYS: [&str; 1] = ["stribeck_friction"];
 const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach,
 const SEEN_OFTEN: f64 = 2.0;
-/// but for what is met seldom by its nature: a load that changes sides.
-const SELDOM: [&str; 1] = ["backlash"];
+/// but for what is met seldom by its nature: a wall, a load that changes sides.
+const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
 const TIP_RESOLUTION: f64 = 2e-6;
 
@@ -274,7 +274,9 @@ impl Search<'_, '_> {
 
     fn accepts(&self, scored: &Scored, judged: &Judged) -> bool {
         let alone = judged.amplitude.is_infinite();
-        let seldom = scored.candidate.edges() == 0 && SELDOM.contains(&scored.candidate.family.physics);
+        // In a window it is met for as long as that lasts; a wall is met seldom all the same.
+        let family = &scored.candidate.family;
+        let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
             && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error)
@@ -375,10 +377,12 @@ impl Search<'_, '_> {
         for (_, scored) in worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best) {
             self.settle_shape(grams, &base, scored);
         }
+        // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
+        let rest = |s: &Scored| others.iter().any(|other| other.shares_edge(&s.candidate));
+        claims.retain(|s| !rest(s));
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
-        // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
-        claims.retain(|s| !others.iter().any(|other| other.shares_edge(&s.candidate)));
+        claims.retain(|s| !rest(s));
         sort(&mut claims);
         let mut claims = distinct(&claims);
         // Rivals are told apart by the rows that count once the best of them is in: what it leaves is its model's error, and
@@ -495,16 +499,23 @@ fn price(candidate: &Candidate) -> f64 {
     candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
 }
 
-/// Claims that hold another one and more, and the share of its score by which they have to be better.
-const HOLDS: [(&str, &str, f64); 2] = [("link_inertia", "payload", 0.03), (UNMODELLED, "cable_stretch", 0.02)];
+/// Claims that hold another one and more, in these forms (all, where none is named), and the share of its score by which they
+/// have to be better.
+const HOLDS: [(&str, &[&str], &str, f64); 2] =
+    [("link_inertia", &[], "payload", 0.03), (UNMODELLED, &HARDENING, "cable_stretch", 0.02)];
 
 /// The share by which a claim has to be better than one that it holds; none where it holds it not.
 fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
-    // A payload hangs on the last link.
-    let place = |joints: &[usize]| if joints.is_empty() { vec![last_link] } else { joints.to_vec() };
-    let physics = (one.family.physics, other.family.physics);
-    let (_, _, share) = HOLDS.into_iter().find(|(larger, smaller, _)| physics == (*larger, *smaller))?;
-    (place(&one.family.joints) == place(&other.family.joints)).then_some(share)
+    // A payload hangs on the last link, unless a site says otherwise.
+    let place = |candidate: &Candidate| match candidate.family.joints.as_slice() {
+        [] => vec![candidate.shape_of("link").map_or(last_link, |link| link as usize)],
+        joints => joints.to_vec(),
+    };
+    let holds = |(larger, forms, smaller, _): &(&str, &[&str], &str, f64)| {
+        (one.family.physics, other.family.physics) == (*larger, *smaller) && (forms.is_empty() || forms.contains(&one.family.form))
+    };
+    let (.., share) = HOLDS.into_iter().find(holds)?;
+    (place(one) == place(other)).then_some(share)
 }
 
 /// Brings the simplest of those that are as good as the best to the front.

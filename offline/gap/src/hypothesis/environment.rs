@@ -13,6 +13,8 @@ use crate::problem::Channel;
 const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
 /// Exponents of its force.
 const EXPONENTS: [f64; 2] = [1.0, 1.5];
+/// The form of a wall.
+pub(crate) const WALL: &str = "wall";
 /// First step by which its normal is turned, rad: half of what the directions are apart.
 const TURN: f64 = 0.4;
 
@@ -74,7 +76,7 @@ fn wall(tips: &Arc<Tips>) -> Family {
     };
     let own = tips.clone();
     let shape = [("x_0", true), ("p", false), ("azimuth", true), ("elevation", true)];
-    let family = Family::shaped("external_contact", &[], "wall", Channel::JointTorque, &[Bound::Positive], &shape, grid, columns);
+    let family = Family::shaped("external_contact", &[], WALL, Channel::JointTorque, &[Bound::Positive], &shape, grid, columns);
     family
         .stepped(&[Some(0.1 * reach), None, Some(TURN), Some(TURN)])
         // A wall that turns is still as deep as it was where the tip goes deepest.

@@ -57,7 +57,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 .penalised(1.0 + altered),
             );
         }
-        // The parameter that the motion shows best comes first, and is the one that is reported.
+        // The first of those that the motion shows is the one that is reported: the mass, where it can be seen.
         let free = independent(dictionary, link, &EVERY);
         let Some(first) = free.first().map(|k| *k as f64) else { continue };
         let bounds = vec![Bound::Free; free.len()];
@@ -100,7 +100,7 @@ fn anywhere(dictionary: &Dictionary, link: usize, tip: &Vector3<f64>) -> Option<
     bounds[0] = Bound::Positive;
     let mut family = Family::secant("payload", &[], "anywhere on the last link", TORQUE, &bounds, &shape, move |d, s| {
         let mut place = Vector3::zeros();
-        if s[0] > 0.0 {
+        if s[0] != 0.0 {
             moments.iter().zip(&s[1..]).for_each(|(k, moment)| place[k - 1] = moment / s[0]);
         }
         let mut of_mass = LinkInertia::point(1.0, place).parameters();
@@ -137,7 +137,8 @@ fn point_column(dictionary: &Dictionary, link: usize, point: &Vector3<f64>) -> s
     weighted_column(dictionary, link, &LinkInertia::point(1.0, *point).parameters())
 }
 
-/// Parameters of a link, of some of them, that the motion tells apart, most visible first (pivoted Gram-Schmidt).
+/// Parameters of a link, of some of them, that the motion tells apart (pivoted Gram-Schmidt): the first one that shows at all, then
+/// the one of which most is left.
 fn independent(dictionary: &Dictionary, link: usize, among: &[usize]) -> Vec<usize> {
     let n = dictionary.joints();
     let regressor = dictionary.regressor();
@@ -149,7 +150,9 @@ fn independent(dictionary: &Dictionary, link: usize, among: &[usize]) -> Vec<usi
     let mut chosen = Vec::new();
     loop {
         let left = among.iter().copied().filter(|k| !chosen.contains(k)).map(|k| (k, a.column(k).norm() / first[k]));
-        let Some((k, _)) = left.filter(|(_, share)| *share >= TOLD_APART).max_by(|x, y| x.1.total_cmp(&y.1)) else { break };
+        // Of equals the first: the mass.
+        let most = |best: (usize, f64), one: (usize, f64)| if one.1 > best.1 { one } else { best };
+        let Some((k, _)) = left.filter(|(_, share)| *share >= TOLD_APART).reduce(most) else { break };
         chosen.push(k);
         let unit = a.column(k) / a.column(k).norm();
         for other in 0..PARAMETERS {

@@ -10,11 +10,13 @@ mod timing;
 mod transmission;
 mod unknown;
 
+pub(crate) use unknown::HARDENING;
 pub use unknown::UNMODELLED;
 
 use std::sync::Arc;
 
 pub use dictionary::{Column, Dictionary, Window};
+pub(crate) use environment::WALL;
 pub use environment::direction;
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST};

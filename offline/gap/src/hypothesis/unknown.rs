@@ -7,6 +7,8 @@ use crate::problem::Channel;
 
 /// Their name in the vocabulary.
 pub const UNMODELLED: &str = "unmodelled";
+/// Forms of a cable that hardens, or has slack: a soft cable and more.
+pub(crate) const HARDENING: [&str; 2] = ["load, bent", "load beyond a level"];
 /// Share of the largest load beyond which a cable is softer, to begin with.
 const SLACK: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 /// Periods of a wave, shares of the travel: from, to, how many.
@@ -80,7 +82,7 @@ fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let family = Family::shaped(
         UNMODELLED,
         &[j],
-        "load, bent",
+        HARDENING[0],
         TRANSMISSION,
         &[Bound::Free, Bound::Free],
         &[("harder", true)],
@@ -96,7 +98,7 @@ fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let family = Family::shaped(
         UNMODELLED,
         &[j],
-        "load beyond a level",
+        HARDENING[1],
         TRANSMISSION,
         &[Bound::Positive],
         &[("level", true)],
