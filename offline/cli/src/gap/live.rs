@@ -14,8 +14,9 @@ use ravenpose::signals;
 use ravenpose_transport::{DEPTH_MAX, Reader, Settings};
 use ravenpose_wire::{PEDAL_DOWN, RavenState};
 use recordings::stream::{Damage, Record, Source, StreamError};
+use recordings::table::TableSource;
 use recordings::tidy::{self, StateTable};
-use recordings::{Recording, table};
+use recordings::{Arms, Recording, table};
 use simulator::RobotModel;
 use std::collections::VecDeque;
 use std::process::ExitCode;
@@ -27,15 +28,17 @@ use std::time::{Duration, Instant};
 const WAITING_MAX: usize = 2048;
 /// This thread looks at the queue that often.
 const PAUSE: Duration = Duration::from_millis(50);
-/// A step of the states' clock beyond this begins the minute anew, ns.
+/// A clock that is set back by more than this begins the minute anew, ns.
 const BREAK_NS: i64 = 1_000_000_000;
-/// Without a state for so long something is said, once.
+/// More than this between two states is no motion that was heard, ns.
+const HOLE_NS: i64 = 10_000_000;
+/// Without a state for so long something is said, and the link is opened anew: its files may have been removed.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A minute of states, as a recording that nobody wrote.
-struct Minute(VecDeque<RavenState>);
+/// States, as a recording that nobody wrote.
+struct States(VecDeque<RavenState>);
 
-impl Source for Minute {
+impl Source for States {
     fn format(&self) -> &'static str {
         "stream"
     }
@@ -57,13 +60,13 @@ impl Source for Minute {
     }
 }
 
-/// What was heard: the newest minute with the pedal down, and when the next look is due.
+/// What was heard: the newest minute with the pedal down, and how much of it is new since the last look.
 struct Heard {
     minute: VecDeque<RavenState>,
-    /// Stamp of the first state of all, ns.
-    first_ns: Option<i64>,
-    /// Stamp from which a further look is due, ns.
-    due_ns: i64,
+    /// From the first state of all to the minute's own clock, ns: another source has another clock.
+    offset_ns: i64,
+    /// Motion heard since the last look, ns.
+    new_ns: i64,
 }
 
 fn stamp_ns(state: &RavenState) -> i64 {
@@ -74,13 +77,16 @@ fn ns(seconds: f64) -> i64 {
     (seconds * 1e9) as i64
 }
 
+/// A minute of states, and s from the first state of all to its first.
+type Minute = (f64, VecDeque<RavenState>);
+
 impl Heard {
     fn new() -> Self {
-        Self { minute: VecDeque::new(), first_ns: None, due_ns: 0 }
+        Self { minute: VecDeque::new(), offset_ns: 0, new_ns: 0 }
     }
 
-    /// Takes a state; the stretch to look at where one is due. Another source, or a clock that jumps, begins anew.
-    fn take(&mut self, mut state: RavenState) -> Option<VecDeque<RavenState>> {
+    /// Takes a state; the stretch to look at where one is due. Another source, or a clock set back, begins anew; a pause is a hole.
+    fn take(&mut self, mut state: RavenState) -> Option<Minute> {
         if (state.hdr_stamp_sec, state.hdr_stamp_nsec) == (0, 0) {
             // Without a stamp of the robot's own: when it was sent.
             state.hdr_stamp_sec = u32::try_from(state.source_time_ns / 1_000_000_000).unwrap_or(0);
@@ -90,23 +96,23 @@ impl Heard {
             return None;
         }
         let now_ns = stamp_ns(&state);
-        let last = self.minute.back().map(|last| (last.source_id == state.source_id, now_ns - stamp_ns(last)));
-        if last.is_some_and(|(same, step_ns)| same && (-BREAK_NS..=0).contains(&step_ns)) {
+        match self.minute.back().map(|last| (last.source_id == state.source_id, stamp_ns(last))) {
             // Told twice, or late.
-            return None;
+            Some((true, last_ns)) if (last_ns - BREAK_NS..=last_ns).contains(&now_ns) => return None,
+            Some((true, last_ns)) if now_ns > last_ns => self.new_ns += (now_ns - last_ns).min(HOLE_NS),
+            before => {
+                self.offset_ns = before.map_or(0, |(_, last_ns)| self.offset_ns + last_ns) - now_ns;
+                self.minute.clear();
+                self.new_ns = 0;
+            }
         }
-        if last.is_none_or(|(same, step_ns)| !same || step_ns.abs() > BREAK_NS) {
-            self.minute.clear();
-            self.due_ns = now_ns + ns(STEP_S);
-        }
-        self.first_ns.get_or_insert(now_ns);
         self.minute.push_back(state);
         while self.minute.front().is_some_and(|first| now_ns - stamp_ns(first) > ns(WINDOW_S)) {
             self.minute.pop_front();
         }
-        (now_ns >= self.due_ns).then(|| {
-            self.due_ns = now_ns + ns(STEP_S);
-            self.minute.clone()
+        (self.new_ns >= ns(STEP_S)).then(|| {
+            self.new_ns = 0;
+            (self.minute.front().map_or(0, |first| self.offset_ns + stamp_ns(first)) as f64 / 1e9, self.minute.clone())
         })
     }
 }
@@ -127,7 +133,7 @@ pub(super) fn watch(model: &RobotModel, options: &Options, wish: &Wish) -> Resul
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
     let queue = ArrayQueue::new(WAITING_MAX);
     let (stop, busy) = (AtomicBool::new(false), AtomicBool::new(false));
-    let (ask, asked) = mpsc::channel::<(f64, VecDeque<RavenState>)>();
+    let (ask, asked) = mpsc::channel::<Minute>();
     let (tell, told) = mpsc::channel::<Look>();
     say!("watching the running service; Ctrl-C ends it");
     std::thread::scope(|scope| {
@@ -137,7 +143,7 @@ pub(super) fn watch(model: &RobotModel, options: &Options, wish: &Wish) -> Resul
             for (from_s, minute) in asked {
                 let length_ns = minute.back().map_or(0, stamp_ns) - minute.front().map_or(0, stamp_ns);
                 let to_s = from_s + length_ns as f64 / 1e9;
-                let outcome = look(model, options, minute);
+                let outcome = look(model, options, (from_s, minute));
                 let heard = tell.send(Look { from_s, to_s, outcome });
                 busy.store(false, Ordering::Release);
                 if heard.is_err() {
@@ -145,32 +151,30 @@ pub(super) fn watch(model: &RobotModel, options: &Options, wish: &Wish) -> Resul
                 }
             }
         });
-        let ended = attend(wish, (queue, &ask, &told), busy, || listening.is_finished() || analysing.is_finished());
+        let ended = attend(wish, (queue, &ask, &told), busy, &[&|| listening.is_finished(), &|| analysing.is_finished()]);
         stop.store(true, Ordering::Relaxed);
         drop(ask);
-        let heard = listening.join().map_err(|_| "the listening thread failed".to_owned()).and_then(|heard| heard);
-        ended.and_then(|ended| heard.map(|()| ended))
+        // Why a thread ended says more than that nothing came of it.
+        listening.join().map_err(|_| "the listening thread failed".to_owned()).and_then(|heard| heard)?;
+        analysing.join().map_err(|_| "the analysing thread failed".to_owned())?;
+        ended
     })
 }
 
-type Links<'a> = (&'a ArrayQueue<RavenState>, &'a mpsc::Sender<(f64, VecDeque<RavenState>)>, &'a mpsc::Receiver<Look>);
+type Links<'a> = (&'a ArrayQueue<RavenState>, &'a mpsc::Sender<Minute>, &'a mpsc::Receiver<Look>);
 
-/// Asks for looks and says what comes of them, until the end.
-fn attend(wish: &Wish, (queue, ask, told): Links, busy: &AtomicBool, gone: impl Fn() -> bool) -> Result<ExitCode, String> {
+/// Asks for looks and says what comes of them, until the end. `gone`: whether the listening and the analysing thread have ended.
+fn attend(wish: &Wish, (queue, ask, told): Links, busy: &AtomicBool, gone: &[&dyn Fn() -> bool; 2]) -> Result<ExitCode, String> {
     let (begun, mut last_state) = (Instant::now(), Instant::now());
     let (mut heard, mut report, mut warned) = (Heard::new(), Report::default(), false);
     let over = || wish.seconds.is_some_and(|seconds| begun.elapsed().as_secs_f64() >= seconds);
-    while !over() && !gone() && !signals::wait(PAUSE) {
+    while !over() && !gone.iter().any(|gone| gone()) && !signals::wait(PAUSE) {
         while let Some(state) = queue.pop() {
-            last_state = Instant::now();
+            (last_state, warned) = (Instant::now(), false);
             let Some(minute) = heard.take(state) else { continue };
-            if busy.swap(true, Ordering::AcqRel) {
-                continue;
-            }
-            let since = heard.first_ns.unwrap_or(0);
-            let from_s = minute.front().map_or(0, |first| stamp_ns(first) - since) as f64 / 1e9;
-            if ask.send((from_s, minute)).is_err() {
-                return Err("the analysing thread failed".to_owned());
+            // A look that is late is left out.
+            if !busy.swap(true, Ordering::AcqRel) && ask.send(minute).is_err() {
+                break;
             }
         }
         if !warned && last_state.elapsed() > PATIENCE {
@@ -183,10 +187,8 @@ fn attend(wish: &Wish, (queue, ask, told): Links, busy: &AtomicBool, gone: impl 
             }
         }
     }
-    // The look that is under way is worth its few seconds.
-    while busy.load(Ordering::Acquire) && !gone() {
-        std::thread::sleep(PAUSE);
-    }
+    // The look that is under way is worth its few seconds; whoever asks twice need not wait.
+    while busy.load(Ordering::Acquire) && !gone[1]() && !signals::wait(PAUSE) {}
     for look in told.try_iter() {
         report.add(look, wish)?;
     }
@@ -195,69 +197,98 @@ fn attend(wish: &Wish, (queue, ask, told): Links, busy: &AtomicBool, gone: impl 
 
 /// What is told at the end.
 #[derive(Default)]
-struct Report(Option<Outcome>);
+struct Report {
+    kept: Option<Outcome>,
+    /// Why the last look that was not possible was not.
+    fault: Option<String>,
+}
 
 impl Report {
-    /// Says a look, and writes its report where it is the one to be kept; false where nobody listens any more.
+    /// Says a look, and writes its report where it is the one to be kept; false where nobody listens any more. A minute that cannot
+    /// be looked at (an arm that stands still) is no end of the watch.
     fn add(&mut self, look: Look, wish: &Wish) -> Result<bool, String> {
-        let outcome = look.outcome?;
+        let (from_s, to_s) = (look.from_s, look.to_s);
+        let outcome = match look.outcome {
+            Ok(outcome) => outcome,
+            Err(fault) => {
+                let goes_on = output::say(format_args!("{from_s:.0} to {to_s:.0} s: not looked at: {fault}\n"));
+                self.fault = Some(fault);
+                return Ok(goes_on);
+            }
+        };
         let words = gap_report::headlines(&outcome.report).join(" ");
-        let goes_on = output::say(format_args!("{:.0} to {:.0} s: {words}\n", look.from_s, look.to_s));
-        if differs(&outcome) || !self.0.as_ref().is_some_and(differs) {
+        let goes_on = output::say(format_args!("{from_s:.0} to {to_s:.0} s: {words}\n"));
+        if differs(&outcome) || !self.kept.as_ref().is_some_and(differs) {
             write(&outcome, wish.out)?;
-            self.0 = Some(outcome);
+            self.kept = Some(outcome);
         }
         Ok(goes_on)
     }
 
     fn end(self, wish: &Wish) -> Result<ExitCode, String> {
-        let Some(outcome) = self.0 else {
-            return Err(format!(
-                "no look was possible: {STEP_S:.0} s of states with the pedal down are needed; start the controller, or give a \
-                 recording with --real"
-            ));
-        };
-        say!("{}", wish.out.join("report.html").display());
-        Ok(status(outcome.report.status))
+        if let Some(outcome) = self.kept {
+            say!("{}", wish.out.join("report.html").display());
+            return Ok(status(outcome.report.status));
+        }
+        let needed = format!(
+            "no look was possible: {STEP_S:.0} s of states with the pedal down are needed; start the controller, or give a recording \
+             with --real"
+        );
+        Err(self.fault.unwrap_or(needed))
     }
 }
 
-fn look(model: &RobotModel, options: &Options, minute: VecDeque<RavenState>) -> Result<Outcome, String> {
+fn look(model: &RobotModel, options: &Options, (from_s, minute): Minute) -> Result<Outcome, String> {
+    let mut notes = Vec::new();
     let missed: u64 = minute.iter().zip(minute.iter().skip(1)).map(|(a, b)| b.sequence.saturating_sub(a.sequence + 1)).sum();
-    let notes = (missed > 0)
-        .then(|| format!("stream: {missed} states were not heard or came with the pedal up; {} are looked at", minute.len()));
-    let mut recording = as_table(minute, model)?;
+    if missed > 0 {
+        notes.push(format!("stream: {missed} states were not heard or came with the pedal up; {} are looked at", minute.len()));
+    }
+    let mut recording = as_table(minute, model, &mut notes)?;
     keep_needed(&mut recording, model);
+    // On the clock of the whole watch.
+    if let Some(time) = recording.columns.iter_mut().find(|column| column.name == "t_s") {
+        time.values.iter_mut().for_each(|t| *t += from_s);
+    }
     let mut bytes = Vec::new();
     for value in recording.columns.iter().flat_map(|column| &column.values) {
         bytes.extend(value.to_le_bytes());
     }
-    let given = Given {
-        id: "stream".to_owned(),
-        real_sha256: sha256(&bytes),
-        real: recording,
-        notes: notes.into_iter().collect(),
-        sim: None,
-    };
+    let given = Given { id: "stream".to_owned(), real_sha256: sha256(&bytes), real: recording, notes, sim: None };
     quietly(model, &[given], options)
 }
 
-fn as_table(minute: VecDeque<RavenState>, model: &RobotModel) -> Result<Recording, String> {
-    let options = tidy::Options { arms: Some(arms_of(model.side())), all_truth: false };
-    let table = StateTable::new(Box::new(Minute(minute)), options);
-    table.and_then(|mut table| table::collect("stream", &mut table)).map_err(|error| error.to_string())
+/// The minute as a table: of two connected arms that of the model, else the one that there is.
+fn as_table(minute: VecDeque<RavenState>, model: &RobotModel, notes: &mut Vec<String>) -> Result<Recording, String> {
+    let table = |states: VecDeque<RavenState>, arms: Option<Arms>| {
+        StateTable::new(Box::new(States(states)), tidy::Options { arms, all_truth: false }).map_err(|error| error.to_string())
+    };
+    let first: VecDeque<RavenState> = minute.iter().take(1).copied().collect();
+    let both = table(first, None)?.columns().iter().any(|column| column.name.starts_with("green_"));
+    let arms = both.then(|| arms_of(model.side()));
+    notes.extend(arms.map(|_| format!("stream: holds both arms; the {} one is looked at", model.side().name())));
+    table::collect("stream", &mut table(minute, arms)?).map_err(|error| error.to_string())
 }
 
 /// Empties the link until told to stop. A state that finds the queue full is dropped: the hole is left out of the analysis.
 fn listen(queue: &ArrayQueue<RavenState>, stop: &AtomicBool) -> Result<(), String> {
-    let states = Reader::<RavenState>::open(&Settings::from_env(), DEPTH_MAX).map_err(|error| error.to_string())?;
+    let open = || Reader::<RavenState>::open(&Settings::from_env(), DEPTH_MAX).map_err(|error| error.to_string());
+    let (mut states, mut last) = (open()?, Instant::now());
     while !stop.load(Ordering::Relaxed) {
+        let mut any = false;
         let taken = states.drain(|state| {
+            any = true;
             if state.admit().is_ok() {
                 let _ = queue.push(*state);
             }
         });
         taken.map_err(|error| error.to_string())?;
+        if any {
+            last = Instant::now();
+        } else if last.elapsed() > PATIENCE {
+            drop(states);
+            (states, last) = (open()?, Instant::now());
+        }
         std::thread::sleep(Duration::from_millis(1));
     }
     Ok(())
@@ -278,27 +309,46 @@ mod tests {
     #[test]
     fn a_look_is_due_every_quarter_of_a_minute_at_a_minute_at_most() {
         let mut heard = Heard::new();
-        let looks: Vec<(i64, usize)> = (1..=100_000).filter_map(|ms| Some((ms, heard.take(state(1, ms))?.len()))).collect();
-        assert_eq!(
-            looks,
-            [(15_001, 15_001), (30_001, 30_001), (45_001, 45_001), (60_001, 60_001), (75_001, 60_001), (90_001, 60_001)]
-        );
+        let looks: Vec<(i64, usize, f64)> =
+            (1..=100_000).filter_map(|ms| heard.take(state(1, ms)).map(|(from_s, minute)| (ms, minute.len(), from_s))).collect();
+        let wanted: Vec<(i64, usize, f64)> =
+            [(15_001, 15_001, 0.0), (30_001, 30_001, 0.0), (45_001, 45_001, 0.0), (60_001, 60_001, 0.0)]
+                .into_iter()
+                .chain([(75_001, 60_001, 15.0), (90_001, 60_001, 30.0)])
+                .collect();
+        assert_eq!(looks, wanted);
     }
 
     #[test]
-    fn another_source_a_jump_and_a_pause_begin_anew_and_the_pedal_up_is_no_motion() {
+    fn another_source_and_a_clock_set_back_begin_anew_and_the_watch_s_own_clock_goes_on() {
         let mut heard = Heard::new();
-        for (source, from_ms) in [(1, 1_000), (2, 6_000), (2, 20_000), (2, 3_000)] {
-            for ms in from_ms..from_ms + 4_000 {
-                assert!(heard.take(state(source, ms)).is_none());
+        let mut from_s = Vec::new();
+        for (source, from_ms) in [(1, 1_000), (2, 600_000), (2, 3_000)] {
+            for ms in from_ms..from_ms + 20_000 {
+                if let Some((from, minute)) = heard.take(state(source, ms)) {
+                    assert_eq!(minute.len(), 15_001, "{source} {from_ms}");
+                    from_s.push(from);
+                }
             }
-            assert_eq!(heard.minute.len(), 4_000, "{source} {from_ms}");
         }
-        assert!(heard.take(state(2, 6_500)).is_none(), "told twice");
-        assert_eq!(heard.minute.len(), 4_000);
-        let mut up = state(2, 7_000);
-        up.runlevel = 2;
-        assert!(heard.take(up).is_none());
-        assert_eq!(heard.minute.len(), 4_000);
+        assert_eq!(from_s, [0.0, 19.999, 39.998]);
+    }
+
+    #[test]
+    fn a_pedal_that_is_up_for_a_while_costs_its_time_alone() {
+        let mut heard = Heard::new();
+        // Six seconds down, four up.
+        let mut looks = Vec::new();
+        for ms in 1..=40_000 {
+            let mut now = state(1, ms);
+            now.runlevel = if ms % 10_000 < 6_000 { PEDAL_DOWN } else { 2 };
+            assert!(heard.take(now).is_none() || now.runlevel == PEDAL_DOWN);
+            if heard.new_ns == 0 && now.runlevel == PEDAL_DOWN && ms > 1 {
+                looks.push((ms, heard.minute.len()));
+            }
+        }
+        assert_eq!(looks.len(), 1, "{looks:?}");
+        assert!((22_900..23_100).contains(&looks[0].0), "{looks:?}");
+        assert!(heard.take(state(1, 35_000)).is_none(), "late");
     }
 }
