@@ -204,6 +204,7 @@ mod tests {
         let run = Run {
             id: String::new(),
             start_s: 0.0,
+            since_s: 0.0,
             dt_s: 0.001,
             points: false,
             position: vec![series.clone()],

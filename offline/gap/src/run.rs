@@ -114,6 +114,8 @@ pub struct Run {
     pub id: String,
     /// First time, s.
     pub start_s: f64,
+    /// Its first sample from the start of the run of which it is a part, s; 0 of a whole run.
+    pub since_s: f64,
     /// Sample period, s; 1 of points.
     pub dt_s: f64,
     /// Are the samples points without a clock, at each of which the robot stood?
@@ -176,6 +178,11 @@ impl Run {
     /// Time of a sample, s.
     pub fn time_s(&self, i: usize) -> f64 {
         self.start_s + i as f64 * self.dt_s
+    }
+
+    /// Time of a sample from the start of the whole run, s.
+    pub fn elapsed_s(&self, i: usize) -> f64 {
+        self.since_s + i as f64 * self.dt_s
     }
 
     /// Takes the columns of a recording.
@@ -265,6 +272,7 @@ impl Run {
         let mut made = Self {
             id: run,
             start_s: clock.start_s,
+            since_s: 0.0,
             dt_s: clock.dt_s,
             mask: vec![false; position[0].len()],
             points: clock.points,
@@ -382,6 +390,7 @@ impl Run {
         Self {
             id: self.id.clone(),
             start_s,
+            since_s: 0.0,
             dt_s,
             points: self.points,
             position: set(&self.position),
@@ -403,6 +412,7 @@ impl Run {
         Self {
             id: self.id.clone(),
             start_s: self.time_s(from),
+            since_s: self.since_s + from as f64 * self.dt_s,
             dt_s: self.dt_s,
             points: self.points,
             position: cut(&self.position),

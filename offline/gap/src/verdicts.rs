@@ -398,7 +398,17 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), regime::subsystem(candidate), regime);
     location.energy_share = Some(share.clamp(0.0, 1.0));
     if let Some(window) = &estimate.window {
-        location.time_intervals = found.problem.pairs.iter().map(|pair| interval(&pair.real.run, window)).collect();
+        for pair in found.problem.pairs.iter().chain(found.held.pairs) {
+            let told = interval(&pair.real.run, window);
+            match location.time_intervals.last_mut() {
+                // The last third of a single run, which is held out, goes on where the rest ended.
+                Some(last) if last.run == told.run && told.end_s > told.start_s => {
+                    (last.end_s, last.end_ci95_s) = (told.end_s, told.end_ci95_s);
+                }
+                Some(last) if last.run == told.run => {}
+                _ => location.time_intervals.push(told),
+            }
+        }
     }
     location
 }
@@ -406,9 +416,10 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
 /// A window in a run, on the run's own clock.
 fn interval(run: &Run, window: &[Option<Edge>; 2]) -> Interval {
     let (first, last) = (run.start_s.max(0.0), run.time_s(run.len() - 1).max(0.0));
-    let at = |edge: &Option<Edge>, open: f64| edge.map_or(open, |(t, _)| (run.start_s + t).clamp(first, last));
+    let start_s = run.start_s - run.since_s;
+    let at = |edge: &Option<Edge>, open: f64| edge.map_or(open, |(t, _)| (start_s + t).clamp(first, last));
     let mut told = Interval::new(&run.id, at(&window[0], first), at(&window[1], last));
-    let ci = |edge: &Option<Edge>| edge.map(|(_, ci)| ci.map(|t| (run.start_s + t).max(0.0)));
+    let ci = |edge: &Option<Edge>| edge.map(|(_, ci)| ci.map(|t| (start_s + t).max(0.0)));
     (told.start_ci95_s, told.end_ci95_s) = (ci(&window[0]), ci(&window[1]));
     told
 }

@@ -60,6 +60,23 @@ fn friction_that_falls_with_speed_is_named_where_it_ends_on_the_way() {
 }
 
 #[test]
+fn of_one_run_what_came_on_the_way_is_there_in_the_third_that_is_held_out() {
+    let folder = Folder::new("one-run");
+    let picked = Wanted { interval: Some([5.0, 120.0]), ..wanted("payload", None, &[("m_p", 0.3)]) };
+    let (case, _) = written(
+        &folder,
+        &Order { seed: 77, label: "cli/one-run".to_owned(), effects: vec![picked], seconds: 24.0, runs: 1, ..Order::default() },
+    );
+    let report = case.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "payload", "{}", report.summary);
+    let [interval] = first.location.time_intervals.as_slice() else { panic!("{:?}", first.location.time_intervals) };
+    assert!((interval.start_s - 5.0).abs() < 0.2 && interval.end_s > 23.5, "{interval:?}");
+    let fit = &first.fit[0];
+    assert!(fit.after < 0.2 * fit.before, "{fit:?}");
+}
+
+#[test]
 fn a_force_for_a_while_is_no_weight() {
     let folder = Folder::new("force");
     let along = [("n_x", 0.6), ("n_y", -0.8), ("n_z", 0.0)].map(|(name, value)| (name.to_owned(), value));

@@ -46,7 +46,7 @@ impl Column {
         let parts = self.parts.iter().map(|(cell, values)| {
             let rows = &problem.cells[*cell].rows;
             let begun = values.iter().zip(rows).map(|(x, &(r, i))| {
-                let t = i as f64 * problem.pairs[r].real.run.dt_s;
+                let t = problem.pairs[r].real.run.elapsed_s(i);
                 if t >= from_s && t < to_s { *x } else { 0.0 }
             });
             (*cell, begun.collect())

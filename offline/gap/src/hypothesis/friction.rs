@@ -172,7 +172,7 @@ pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64
             let before = row.checked_sub(1).map(|b| dictionary.grid[b]).filter(|b| b.0 == r);
             match before {
                 Some(before) => h += (i - before.1) as f64 * pair.run.dt_s * square / mean,
-                None => h = i as f64 * pair.run.dt_s,
+                None => h = pair.run.elapsed_s(i),
             }
             1.0 - (-h / heating_s).exp()
         })

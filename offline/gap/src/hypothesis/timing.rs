@@ -17,7 +17,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
                 "tip, drifting",
                 Channel::EndEffector,
                 &[bound, Bound::Between(-0.01, 0.01)],
-                |d| vec![late_tip(d, |_, _| 1.0), late_tip(d, |r, i| i as f64 * d.problem.pairs[r].real.run.dt_s)],
+                |d| vec![late_tip(d, |_, _| 1.0), late_tip(d, |r, i| d.problem.pairs[r].real.run.elapsed_s(i))],
             )
             .penalised(2.0),
         );

@@ -109,7 +109,7 @@ fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
     let mut out: Vec<f64> = Vec::with_capacity(load.len());
     let mut before: Option<(usize, f64, f64)> = None;
     for (&(r, i, _), now) in dictionary.grid.iter().zip(&load) {
-        let time_s = i as f64 * dictionary.problem.pairs[r].real.run.dt_s;
+        let time_s = dictionary.problem.pairs[r].real.run.elapsed_s(i);
         let place = match before.filter(|(run, ..)| *run == r) {
             // Where a run begins it has come to rest.
             None => 0.5 * now.signum(),
