@@ -1,6 +1,6 @@
 //! What the built-in simulator makes of a recording's commands, where no other simulation is given.
 
-use recordings::Recording;
+use recordings::{Column, Recording};
 use simulator::model::RobotModel;
 use simulator::plant::Given;
 use simulator::resimulate::{ClosedLoop, Motion, OpenLoop, ResimulateError, Run, Simulated, closed_loop, inverse, open_loop};
@@ -15,20 +15,20 @@ pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording>
     along(model, recording, |run| if model.controller().is_some() { in_loop(run) } else { given(model, run) }).ok()
 }
 
-/// The model's controller along the recorded commands.
+/// The model's controller along the recorded commands, told from so long after the first row on, s.
 ///
 /// # Errors
 /// What keeps it from being simulated, in one line.
-pub fn along_commands(model: &RobotModel, recording: &Recording) -> Result<Recording, String> {
-    along(model, recording, |run| closed_loop(model, &run, ClosedLoop::default()))
+pub fn along_commands(model: &RobotModel, recording: &Recording, from_s: f64) -> Result<Recording, String> {
+    along(model, recording, |run| closed_loop(model, &run, ClosedLoop { from_s, ..ClosedLoop::default() }))
 }
 
-/// The model driven by the recorded torque, started anew from the recorded state after every `window_s`.
+/// The model driven by the recorded torque, started anew from the recorded state after every `window_s`, told from `from_s` on.
 ///
 /// # Errors
 /// What keeps it from being simulated, in one line.
-pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64) -> Result<Recording, String> {
-    let options = OpenLoop { window_s, ..OpenLoop::default() };
+pub fn along_torque(model: &RobotModel, recording: &Recording, window_s: f64, from_s: f64) -> Result<Recording, String> {
+    let options = OpenLoop { window_s, from_s, ..OpenLoop::default() };
     along(model, recording, |mut run| {
         // The torque drives it; these would only take memory meanwhile.
         (run.joints_d, run.true_joints) = (None, None);
@@ -55,6 +55,11 @@ fn along(
 
 /// The recording as a run, its empty cells bridged.
 fn run(model: &RobotModel, recording: &Recording) -> Result<Run, ResimulateError> {
+    // Minutes of it take much memory: a copy only where there is something to bridge.
+    let whole = |column: &Column| column.values.iter().all(|value| value.is_finite());
+    if recording.columns.iter().all(whole) {
+        return Run::from_recording(recording, model);
+    }
     let mut recording = recording.clone();
     for column in &mut recording.columns {
         // A simulation of an empty cell is empty from there on.

@@ -39,8 +39,10 @@ struct Played {
     after: Motion,
 }
 
-/// What the simulator makes of a recording; one line where it cannot.
-type Play = dyn Fn(&RobotModel, &Recording) -> Result<Recording, String>;
+/// What the simulator makes of a recording, from so long after its first row on, s; one line where it cannot.
+type Play = dyn Fn(&RobotModel, &Recording, f64) -> Result<Recording, String>;
+/// Told before what was held out begins, s: no sample of it lies at the edge.
+const EARLIER_S: f64 = 0.1;
 
 /// Plays the held-out runs with the model `before` and with `after`, in which the effects are.
 pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[Given], band: Band) -> Again {
@@ -63,7 +65,7 @@ pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[
             Err(why) => told(format!("in the loop: {why}")),
         }
     }
-    match played(models, found, given, band, &|model, recording| along_torque(model, recording, WINDOW_S)) {
+    match played(models, found, given, band, &|model, recording, from_s| along_torque(model, recording, WINDOW_S, from_s)) {
         Ok(played) => add_fits(&mut out.fits, found, &|of| driven_fit(found, of, &played)),
         // Where the loop says it, a recording without torque needs no line of its own.
         Err(why) if !in_loop => told(format!("with the recorded torque: {why}")),
@@ -90,7 +92,8 @@ fn played(
     let first = given.len().saturating_sub(found.held.pairs.len());
     let runs = found.held.pairs.iter().zip(&given[first..]);
     runs.map(|(pair, given)| {
-        let of = |model: &RobotModel| play(model, &given.real).and_then(|sim| run_of(&sim, found.robot));
+        let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
+        let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
         let (before, after) = (of(models.0)?, of(models.1)?);
         let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
         let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);

@@ -128,7 +128,7 @@ fn cell_columns(dictionary: &Dictionary, c: usize) -> Vec<(&'static str, Column)
     let on_grid = cell.channel != crate::problem::Channel::EndEffector;
     let column = |series: Vec<f64>| {
         let mut column = Column::default();
-        column.push(Some(c), if on_grid { series } else { dictionary.to_tip(&series) });
+        column.push(Some(c), &if on_grid { series } else { dictionary.to_tip(&series) });
         column.silence(dictionary.problem);
         column
     };

@@ -205,7 +205,8 @@ fn difference(there: &Candidate, here: &Candidate, theta: &[f64], step: f64) -> 
         let (a, b) = (sum(there), sum(here));
         let rows = a.len().max(b.len());
         let value = |s: &[f64], i: usize| s.get(i).copied().unwrap_or(0.0);
-        out.push(Some(cell), (0..rows).map(|i| (value(&a, i) - value(&b, i)) / step).collect());
+        let slope: Vec<f64> = (0..rows).map(|i| (value(&a, i) - value(&b, i)) / step).collect();
+        out.push(Some(cell), &slope);
     }
     out
 }

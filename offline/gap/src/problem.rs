@@ -41,14 +41,14 @@ impl Cell {
     }
 
     /// Makes a series 0 where the cell says nothing.
-    pub fn silence(&self, series: &mut [f64]) {
+    pub fn silence<T: Copy + Default>(&self, series: &mut [T]) {
         zero_at(series, &self.silent);
     }
 }
 
-fn zero_at(series: &mut [f64], places: &[usize]) {
+fn zero_at<T: Copy + Default>(series: &mut [T], places: &[usize]) {
     for &k in places {
-        series[k] = 0.0;
+        series[k] = T::default();
     }
 }
 

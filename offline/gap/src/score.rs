@@ -102,8 +102,9 @@ impl<'a> Scorer<'a> {
     }
 
     fn parts(&self, column: &Column) -> Parts {
-        let whitened = |c: usize, values: &[f64]| {
-            let mut series = whiten(self.problem, &self.noise[c], c, values);
+        let whitened = |c: usize, values: &[f32]| {
+            let values: Vec<f64> = values.iter().map(|x| f64::from(*x)).collect();
+            let mut series = whiten(self.problem, &self.noise[c], c, &values);
             self.beside[c].apply(&mut series);
             series
         };

@@ -41,7 +41,8 @@ fn simulated(robot: &RobotModel) -> f64 {
         torque: Some((0..PERIODS * rows).map(|k| wide(force[k % rows])).collect()),
         ..Run::default()
     };
-    let found = open_loop(robot, &run, OpenLoop { window_s: f64::INFINITY, hold: Hold::Smooth }).expect("simulated");
+    let found =
+        open_loop(robot, &run, OpenLoop { window_s: f64::INFINITY, hold: Hold::Smooth, ..OpenLoop::default() }).expect("simulated");
     let squares: f64 = (0..rows).map(|k| (found.true_joints[(PERIODS - 2) * rows + k][0] - displacement[k]).powi(2)).sum();
     (squares / rows as f64).sqrt()
 }

@@ -43,7 +43,7 @@ fn rms(robot: &RobotModel, hold: Hold) -> Option<(f64, f64)> {
         torque: Some((0..PERIODS * rows).map(|k| wide(table.number(k % rows, "force_N"))).collect()),
         ..Run::default()
     };
-    let found = open_loop(robot, &run, OpenLoop { window_s: f64::INFINITY, hold }).expect("simulated");
+    let found = open_loop(robot, &run, OpenLoop { window_s: f64::INFINITY, hold, ..OpenLoop::default() }).expect("simulated");
     let (mut squares, mut sum) = (0.0, 0.0);
     for row in 0..rows {
         let given = table.number(row, "disp_m");

@@ -98,6 +98,27 @@ fn commands_of_another_simulator_give_nearly_its_motion() {
 }
 
 /// The robot with one more effect.
+/// Rows from `first` on.
+fn tail(found: &Simulated, first: usize) -> (Vec<f64>, Vec<Vector>, Vec<Vector>) {
+    (found.time_s[first..].to_vec(), found.motors[first..].to_vec(), found.torque[first..].to_vec())
+}
+
+#[test]
+fn rows_that_are_not_kept_are_simulated_all_the_same() {
+    let Some(urdf) = gap_urdf() else { return };
+    let robot = robot(&urdf);
+    let recorded = run(&robot, "a/sim_1.csv.gz");
+    let from_s = 7.0;
+    let first = recorded.time_s.iter().position(|time_s| time_s - recorded.time_s[0] >= from_s).expect("longer");
+    let in_loop =
+        |from_s: f64| closed_loop(&robot, &recorded, ClosedLoop { from_s, ..ClosedLoop::default() }).expect("closed loop");
+    let driven = |from_s: f64| open_loop(&robot, &recorded, OpenLoop { from_s, ..OpenLoop::default() }).expect("open loop");
+    for (whole, part) in [(in_loop(0.0), in_loop(from_s)), (driven(0.0), driven(from_s))] {
+        assert_eq!((whole.len(), part.len()), (recorded.len(), recorded.len() - first));
+        assert_eq!(tail(&whole, first), tail(&part, 0));
+    }
+}
+
 fn with(robot: &RobotModel, name: &str, numbers: &[(&str, f64)], bound: Bound, from_s: f64) -> RobotModel {
     let mut robot = robot.clone();
     let effect = Effect::new(physics(name, numbers), bound);

@@ -10,11 +10,12 @@ use crate::problem::{Channel, Problem};
 /// From when to when an effect is there, s from the start of each run; infinite where it does not begin or end in it.
 pub type Window = [f64; 2];
 
-/// One coefficient's part in every residual: `(cell, values)`, absent where it has none.
+/// One coefficient's part in every residual: `(cell, values)`, absent where it has none. The library is what fills the memory:
+/// values in single precision take half of it, and differ by less than any recording resolves; sums are made in double.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Column {
     /// Cells in rising order.
-    pub parts: Vec<(usize, Vec<f64>)>,
+    pub parts: Vec<(usize, Vec<f32>)>,
 }
 
 impl Column {
@@ -24,12 +25,12 @@ impl Column {
     }
 
     /// Adds a part; a cell that is not there takes nothing.
-    pub fn push(&mut self, cell: Option<usize>, values: Vec<f64>) {
+    pub fn push(&mut self, cell: Option<usize>, values: &[f64]) {
         if let Some(cell) = cell
             && values.iter().any(|x| *x != 0.0)
         {
             let at = self.parts.partition_point(|(c, _)| *c < cell);
-            self.parts.insert(at, (cell, values));
+            self.parts.insert(at, (cell, values.iter().map(|x| *x as f32).collect()));
         }
     }
 
@@ -161,7 +162,7 @@ impl<'a> Dictionary<'a> {
         let mut column = Column::default();
         for (j, torque) in torques.iter().enumerate() {
             let Some(torque) = torque else { continue };
-            column.push(self.problem.cell(Channel::JointTorque, j), torque.clone());
+            column.push(self.problem.cell(Channel::JointTorque, j), torque);
         }
         if at_link {
             let stretched: Vec<Option<Vec<f64>>> = torques
@@ -218,7 +219,7 @@ impl<'a> Dictionary<'a> {
         let mut tip = vec![vec![0.0; self.tip_rows.len()]; 3];
         for (j, deflection) in deflections.iter().enumerate() {
             let Some(deflection) = deflection else { continue };
-            column.push(self.problem.cell(Channel::Transmission, j), deflection.clone());
+            column.push(self.problem.cell(Channel::Transmission, j), deflection);
             if !self.problem.tip_from_truth && !self.tip_rows.is_empty() {
                 // The link stays behind the motor by the deflection.
                 for (row, d) in self.to_tip(deflection).into_iter().enumerate() {
@@ -229,7 +230,7 @@ impl<'a> Dictionary<'a> {
             }
         }
         for (axis, tip) in tip.into_iter().enumerate() {
-            column.push(self.problem.cell(Channel::EndEffector, axis), tip);
+            column.push(self.problem.cell(Channel::EndEffector, axis), &tip);
         }
     }
 
@@ -238,7 +239,7 @@ impl<'a> Dictionary<'a> {
         let moved: Vec<[f64; 3]> = self.tip_rows.iter().enumerate().map(|(row, &(r, i))| displacement(r, i, row)).collect();
         let mut column = Column::default();
         for axis in 0..3 {
-            column.push(self.problem.cell(Channel::EndEffector, axis), moved.iter().map(|d| d[axis]).collect());
+            column.push(self.problem.cell(Channel::EndEffector, axis), &moved.iter().map(|d| d[axis]).collect::<Vec<_>>());
         }
         column
     }

@@ -223,7 +223,7 @@ impl Candidate {
         for (column, theta) in self.columns.iter().zip(coefficients) {
             for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
                 sum.resize(values.len(), 0.0);
-                sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * x);
+                sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * f64::from(*x));
             }
         }
         sum

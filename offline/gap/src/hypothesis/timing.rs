@@ -62,7 +62,7 @@ fn late_torque(dictionary: &Dictionary) -> Column {
                 slope.push(-(model[high] - model[low]) / ((high - low).max(1) as f64 * step));
             }
         }
-        column.push(problem.cell(Channel::JointTorque, j), slope);
+        column.push(problem.cell(Channel::JointTorque, j), &slope);
     }
     column
 }

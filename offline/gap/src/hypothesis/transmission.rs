@@ -326,7 +326,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
             // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
             let mut column = ratio(d);
-            column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+            column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
             vec![column]
         })
         .penalised(0.5),
@@ -340,7 +340,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(
         Family::fixed("transmission_ratio", &[j], "about where it was homed, torque too", TRANSMISSION, &[small, free], move |d| {
             let mut column = ratio(d);
-            column.push(d.problem.cell(Channel::JointTorque, j), d.load(j));
+            column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
             vec![column, offset(d, j)]
         })
         .penalised(1.5),
@@ -399,7 +399,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
                 // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
                 let mut column = coupled(d);
-                column.push(d.problem.cell(Channel::JointTorque, i), minus(&d.load(j)));
+                column.push(d.problem.cell(Channel::JointTorque, i), &minus(&d.load(j)));
                 vec![column]
             })
             .penalised(1.0),

@@ -14,12 +14,14 @@ pub struct OpenLoop {
     pub window_s: f64,
     /// What the torque does between two samples.
     pub hold: Hold,
+    /// Rows earlier than this after the first, s, are simulated and not kept.
+    pub from_s: f64,
 }
 
 impl Default for OpenLoop {
     /// Windows of one second, torque in steps.
     fn default() -> Self {
-        Self { window_s: 1.0, hold: Hold::Steps }
+        Self { window_s: 1.0, hold: Hold::Steps, from_s: 0.0 }
     }
 }
 
@@ -45,7 +47,7 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
     let timed = is_timed(model);
     let mut state = State::ZERO;
     let mut next_start_s = f64::NEG_INFINITY;
-    let mut out = Simulated::new(model.joint_count(), run.len());
+    let mut out = Simulated::new(model.joint_count(), run.rows_from(options.from_s));
     for row in 0..run.len() {
         let time_s = run.time_s[row] - run.time_s[0];
         if timed {
@@ -55,7 +57,10 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
             state = start(&mut plant, &sensors, run, row, &state);
             next_start_s = time_s + options.window_s;
         }
-        out.push(run.time_s[row], &sensors.see(&state, time_s), &torque[row]);
+        let seen = sensors.see(&state, time_s);
+        if time_s >= options.from_s {
+            out.push(run.time_s[row], &seen, &torque[row]);
+        }
         let Some(next_s) = run.time_s.get(row + 1) else { break };
         let part_s = (next_s - run.time_s[row]) / held.parts() as f64;
         for part in 0..held.parts() {

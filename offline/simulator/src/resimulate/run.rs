@@ -78,6 +78,11 @@ impl Run {
         self.time_s.len()
     }
 
+    /// Rows not earlier than a time after the first, s.
+    pub(super) fn rows_from(&self, from_s: f64) -> usize {
+        self.time_s.iter().filter(|time_s| **time_s - self.time_s[0] >= from_s).count()
+    }
+
     /// Has it no row?
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
