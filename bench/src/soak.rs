@@ -30,7 +30,7 @@ const DEPTH: usize = 256;
 
 /// Silence after which the service is looked at.
 const SILENCE_NS: i64 = 1_000_000_000;
-/// States that may be skipped while corrections return after a fault.
+/// States on their way at the end of a part; and those that may be skipped while corrections return after a fault, where raw poses are counted.
 const SLACK: u64 = 100;
 
 /// What a part of the soak came to.
@@ -48,8 +48,8 @@ struct Seen {
     held: u64,
     /// Raw poses for what the machine did: late, stale, and settling after it.
     delayed: u64,
-    /// Up to this state, settling is explained by such a delay.
-    upset_until: u64,
+    /// Good cycles that the last pose was still short of; none if that pose is not known.
+    hold: Option<u32>,
 }
 
 /// Quiet for a minute, then under `load` for `minutes`.
@@ -78,10 +78,10 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
     let _idle = (0..idle).map(|_| open(IDLE_DEPTH)).collect::<Result<Vec<_>, _>>()?;
     let link = (Writer::<RavenState>::open(&settings).map_err(|error| error.to_string())?, open(DEPTH)?);
     // The service is new to the first states.
-    let mut warming = Seen { upset_until: WARM_UP, ..Seen::default() };
+    let mut warming = Seen::default();
     send(&mut world, &link, 1..=WARM_UP, &mut warming)?;
     let before = world.loop_faults();
-    let mut seen = Seen { age: Vec::with_capacity((seconds * 1000) as usize), upset_until: warming.upset_until, ..Seen::default() };
+    let mut seen = Seen { age: Vec::with_capacity((seconds * 1000) as usize), hold: warming.hold, ..Seen::default() };
     let (first, last) = (WARM_UP + 1, WARM_UP + seconds * 1000);
     send(&mut world, &link, first..=last, &mut seen)?;
     let after = world.loop_faults();
@@ -148,6 +148,7 @@ fn send(
                 return Err(format!("pose {} came, {expected} was expected", pose.sequence));
             }
             seen.missed += pose.sequence.saturating_sub(expected);
+            seen.hold = seen.hold.filter(|_| last.is_some() && pose.sequence == expected);
             (last, heard_ns) = (Some(pose.sequence), read_ns);
             judge(&pose, seen)?;
         }
@@ -176,21 +177,28 @@ fn judge(pose: &CorrectedPose, seen: &mut Seen) -> Result<(), String> {
     /// What is said of an impossible state as well.
     const ALONG: u32 = flag::SETTLING | flag::OUT_OF_RANGE | flag::OUT_OF_DOMAIN;
     let (arm, sequence) = (&pose.arm[0], pose.source_sequence);
-    let settling = u64::from(Limits::default().good_cycles) + SLACK;
+    let good_cycles = Limits::default().good_cycles;
     let reasons = arm.flags & FALLBACK_REASONS;
     seen.poses += 1;
     seen.age.push(pose.publish_time_ns - pose.source_time_ns);
-    if reasons & DELAYED != 0 {
-        seen.upset_until = sequence + settling;
+    let after_fault = (sequence % NOT_FINITE).min(sequence % IMPOSSIBLE) <= u64::from(good_cycles) + SLACK;
+    // Every reason begins the settling anew, and every good cycle brings it nearer, by one.
+    let is_good = reasons == 0 || reasons & flag::SETTLING != 0;
+    let counted = match seen.hold.replace(arm.hold_cycles) {
+        _ if !is_good => arm.hold_cycles == good_cycles,
+        Some(before) => arm.hold_cycles == before.saturating_sub(1),
+        None => true,
+    };
+    if !counted {
+        return Err(format!("state {sequence}: {} cycles to settle, flags {:#x}", arm.hold_cycles, arm.flags));
     }
-    let after_fault = (sequence % NOT_FINITE).min(sequence % IMPOSSIBLE) <= settling;
     let valid = arm.status == ArmStatus::Valid as u32;
     match (wanted(sequence), reasons & !DELAYED) {
-        (0, 0) if valid && reasons == 0 => seen.valid += 1,
+        (0, 0) if valid && reasons == 0 && arm.hold_cycles == 0 => seen.valid += 1,
         // One that is stale is not judged again.
         (_, 0) if !valid && reasons != 0 => seen.delayed += 1,
         (0, flag::SETTLING) if !valid && after_fault => seen.held += 1,
-        (0, flag::SETTLING) if !valid && sequence <= seen.upset_until => seen.delayed += 1,
+        (0, flag::SETTLING) if !valid => seen.delayed += 1,
         (wanted, found) if wanted & found != 0 && !valid && found & !(wanted | ALONG) == 0 => seen.refused += 1,
         _ => return Err(format!("a wrong answer to state {sequence}: status {}, flags {:#x}", arm.status, arm.flags)),
     }
