@@ -139,6 +139,8 @@ const REMOVED: f64 = 0.95;
 const OF_A_MODEL: f64 = 0.05;
 /// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
 const ABOUT: f64 = 0.4;
+/// An effect that gains less than so many times what is asked has to leave less of what was held out, too.
+const BARELY: f64 = 3.0;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
@@ -310,7 +312,16 @@ fn analyse_with(
     });
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
-    let estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
+    let held_problem = prior.put_on(Problem::new(&robot, &nominal, &held, BLOCK_S));
+    let held_dictionary = Dictionary::new(&held_problem);
+    let mut estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
+    if let [only] = answer.effects.as_slice()
+        && only.gain.nats < BARELY * options.thresholds.nats
+        && !verdicts::hold_up(&problem, &held_dictionary, (&answer.effects, &estimates), &floors)
+    {
+        answer.withdraw();
+        estimates.clear();
+    }
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
@@ -321,10 +332,7 @@ fn analyse_with(
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
-    let held_problem = Problem::new(&robot, &nominal, &held, BLOCK_S);
-    let held_problem = prior.put_on(held_problem);
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
-    let held_dictionary = Dictionary::new(&held_problem);
     // What the controller acts on is what was logged, but where motors or torques are logged late.
     let late = answer.effects.iter().zip(&estimates).any(|(effect, estimate)| {
         let family = &effect.chosen.candidate.family;

@@ -57,6 +57,9 @@ const NEAR_IN_WINDOW: f64 = 0.5;
 /// Share of a claim's score by which a form of more numbers has to be better than a simpler one.
 const SAME_FORM: f64 = 0.01;
 
+/// Share of the best claim's score from which on a rival begins again with its rounding.
+const ROUNDED: f64 = 0.2;
+
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
 const MOST_CLOSE: usize = 5;
@@ -122,6 +125,18 @@ pub struct Answer<'a> {
     pub scorer: Scorer<'a>,
     /// Everything that could have been said.
     pub families: Vec<Arc<Family>>,
+}
+
+impl Answer<'_> {
+    /// Takes everything back that was accepted; the first of it is then the best that was not.
+    pub fn withdraw(&mut self) {
+        let first = (!self.effects.is_empty()).then(|| self.effects.remove(0).chosen);
+        self.effects.clear();
+        self.grams = self.scorer.empty();
+        self.fit = self.none.clone();
+        self.scorer.temper(&self.grams, &self.fit);
+        self.next = first.or(self.next.take());
+    }
 }
 
 /// Measurement noise of every cell: white at the sensor, coloured by the window.
@@ -377,6 +392,8 @@ impl Search<'_, '_> {
         for (_, scored) in worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best) {
             self.settle_shape(grams, &base, scored);
         }
+        sort(&mut claims);
+        self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
         let rest = |s: &Scored| others.iter().any(|other| other.shares_edge(&s.candidate));
         claims.retain(|s| !rest(s));
@@ -428,6 +445,45 @@ impl Search<'_, '_> {
             same.any(|other| other.score >= (1.0 - SAME_FORM) * form.score)
         };
         forms.iter().filter(|form| !enough(form)).cloned().collect()
+    }
+
+    /// How a sign turns round belongs to the joint and not to the law: rivals of the best claim, which round otherwise and do worse, begin
+    /// again from its numbers. A search over one more number than it has starts seldom finds them.
+    fn round_alike(&self, grams: &Grams, base: &Fit, claims: &mut [Scored]) {
+        let Some((best, rivals)) = claims.split_first_mut() else { return };
+        let own = &best.candidate;
+        let rounding: Vec<(&str, f64)> =
+            own.family.shape.iter().copied().zip(own.shape.iter().copied()).filter(|(name, _)| rounds(name)).collect();
+        let least = ROUNDED * best.score;
+        let alike = |family: &Family| {
+            family.joints == own.family.joints
+                && family.form == own.family.form
+                && rounding.iter().all(|(name, _)| family.shape.contains(name))
+        };
+        for rival in rivals.iter_mut().filter(|rival| !rounding.is_empty() && rival.score > least.max(3.0)) {
+            let mut starts: Vec<Candidate> = Vec::new();
+            for start in &self.candidates {
+                if !start.same_claim(&rival.candidate) || !alike(&start.family) {
+                    continue;
+                }
+                let mut shape = start.shape.clone();
+                for (name, value) in &rounding {
+                    if let Some(k) = start.family.shape.iter().position(|own| own == name) {
+                        shape[k] = *value;
+                    }
+                }
+                let candidate = Candidate::new(self.dictionary, &start.family, &shape, rival.candidate.window);
+                if candidate.shows() && !starts.iter().any(|other| other.same_start(&candidate)) {
+                    starts.push(candidate);
+                }
+            }
+            let scored = starts.iter().filter_map(|start| self.score(grams, base, start));
+            let Some(mut again) = scored.max_by(|a, b| a.score.total_cmp(&b.score)) else { continue };
+            self.settle_shape(grams, base, &mut again);
+            if again.score > rival.score {
+                *rival = again;
+            }
+        }
     }
 
     /// Moves a candidate between the grid's points, where that is better.
@@ -521,21 +577,19 @@ fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
 /// Brings the simplest of those that are as good as the best to the front.
 fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
     let Some(best) = claims.first() else { return };
-    let score = best.score;
-    let good = |claim: &Scored| {
+    let good = |best: &Scored, claim: &Scored| {
         let share = held(&best.candidate, &claim.candidate, last_link).unwrap_or(equal);
-        claim.score >= score - (share * score.abs()).max(3.0)
+        claim.score >= best.score - (share * best.score.abs()).max(3.0)
     };
     let simplest = (0..claims.len())
-        .filter(|k| good(&claims[*k]))
+        .filter(|k| good(best, &claims[*k]))
         .min_by(|a, b| complexity(&claims[*a].candidate).total_cmp(&complexity(&claims[*b].candidate)));
     if let Some(k) = simplest {
         claims[..=k].rotate_right(1);
     }
     // Of what was taken for simpler, the part may be enough.
     let Some(part) = claims.iter().position(|c| held(&claims[0].candidate, &c.candidate, last_link).is_some()) else { return };
-    let share = held(&claims[0].candidate, &claims[part].candidate, last_link).unwrap_or(0.0);
-    if claims[part].score >= claims[0].score - (share * claims[0].score.abs()).max(3.0) {
+    if good(&claims[0], &claims[part]) {
         claims[..=part].rotate_right(1);
     }
 }

@@ -12,7 +12,7 @@ use gap_report::{
 use crate::analysis::{Found, Given, Options, Outcome};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
-use crate::hypothesis::{Candidate, UNMODELLED};
+use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
 use crate::intervals::{Edge, Estimate};
 use crate::nominal::{less_means, rms};
 use crate::pictures;
@@ -426,23 +426,48 @@ fn interval(run: &Run, window: &[Option<Edge>; 2]) -> Interval {
 
 /// Residuals of a cell of what was held out, before and after the correction by all effects.
 pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
-    let of = &found.problem.cells[cell];
-    let c = found.held.cell(of.channel, of.index)?;
-    let before = found.held.cells[c].residual.clone();
+    corrected(found.problem, found.held_dictionary, (&found.answer.effects, found.estimates), &found.beside[cell], cell)
+}
+
+/// The same of some effects with their sizes, beside the likeliest values of what is known only roughly.
+fn corrected(
+    problem: &Problem,
+    held_dictionary: &Dictionary,
+    (effects, estimates): (&[Effect], &[Estimate]),
+    beside: &[f64],
+    cell: usize,
+) -> Option<(usize, Vec<f64>, Vec<f64>)> {
+    let (of, held) = (&problem.cells[cell], held_dictionary.problem);
+    let c = held.cell(of.channel, of.index)?;
+    let before = held.cells[c].residual.clone();
     let mut after = before.clone();
-    for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
+    for (effect, estimate) in effects.iter().zip(estimates) {
         let own = &effect.chosen.candidate;
-        let there = Candidate::new(found.held_dictionary, &own.family, &own.shape, own.window);
+        let there = Candidate::new(held_dictionary, &own.family, &own.shape, own.window);
         there.take_off(c, &estimate.coefficients, &mut after);
     }
-    let nuisance = &found.held.nuisances[c];
-    if found.problem.nuisances[cell].of_run.contains(&true) {
-        let rows = &found.held.cells[c].rows;
+    let nuisance = &held.nuisances[c];
+    if problem.nuisances[cell].of_run.contains(&true) {
+        let rows = &held.cells[c].rows;
         after = less_means(&after, |k| rows[k].0);
-    } else if nuisance.columns.len() == found.beside[cell].len() && !nuisance.columns.is_empty() {
-        after.iter_mut().zip(nuisance.predict(&found.beside[cell])).for_each(|(y, p)| *y -= p);
+    } else if nuisance.columns.len() == beside.len() && !nuisance.columns.is_empty() {
+        after.iter_mut().zip(nuisance.predict(beside)).for_each(|(y, p)| *y -= p);
     }
     Some((c, before, after))
+}
+
+/// Do effects leave less of what was held out, in the cell where the first of them shows most?
+pub(crate) fn hold_up(
+    problem: &Problem,
+    held_dictionary: &Dictionary,
+    (effects, estimates): (&[Effect], &[Estimate]),
+    floors: &[f64],
+) -> bool {
+    let [(effect, estimate), ..] = effects.iter().zip(estimates).collect::<Vec<_>>()[..] else { return true };
+    let cell = main_cell(floors, &effect.chosen.candidate, &estimate.coefficients);
+    let beside = &beside(problem, effects, estimates)[cell];
+    corrected(problem, held_dictionary, (effects, estimates), beside, cell)
+        .is_none_or(|(_, before, after)| rms(after.into_iter()) < rms(before.into_iter()))
 }
 
 /// Likeliest values of what is known only roughly beside all effects, per cell.
