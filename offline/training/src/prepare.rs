@@ -45,7 +45,7 @@ pub struct Prepared {
 const SLOTS: [usize; 7] = [0, 1, 2, 4, 5, 6, 7];
 
 /// The sums that [`Preparation::Physical`] uses: first features of the fields, wire/src/features.rs.
-fn physical() -> Vec<Vec<(usize, f64)>> {
+pub(crate) fn physical() -> Vec<Vec<(usize, f64)>> {
     let alone = |start: usize, slots: &[usize]| slots.iter().map(|slot| vec![(start + slot, 1.0)]).collect::<Vec<_>>();
     let minus =
         |a: usize, b: usize, slots: &[usize]| slots.iter().map(|slot| vec![(a + slot, 1.0), (b + slot, -1.0)]).collect::<Vec<_>>();

@@ -278,7 +278,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
     methods.push(judge.method("model", "this model file", &estimates, None, Some(estimate_us)));
     if wish.rivals && !train.is_empty() {
         // Rivals see the 118 features alone: the memory is the model's.
-        for (name, what, mut rival) in rivals::all(set.is_raven, own_inputs, wish.seed) {
+        for (name, what, mut rival) in rivals::all(set.is_raven.then_some(reading.arm), own_inputs, wish.seed) {
             told(name);
             let begun = Instant::now();
             rival.fit(&train, outputs);

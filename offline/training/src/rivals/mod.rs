@@ -2,14 +2,20 @@
 
 mod forest;
 mod gaussian;
+mod kalman;
 mod polynomial;
+mod recurrent;
 mod rigid;
 
 use crate::data::Trajectory;
+use crate::prepare;
+use arm::Side;
 
 pub use forest::Forest;
 pub use gaussian::Gaussian;
+pub use kalman::Kalman;
 pub use polynomial::Polynomial;
+pub use recurrent::Recurrent;
 pub use rigid::RigidForest;
 
 /// Something that learns the error from trajectories.
@@ -23,11 +29,11 @@ pub trait Rival {
 /// Features of `raven118-v1` that describe the posture: `jpos` of the seven joints.
 pub(crate) const POSTURE: [usize; 7] = [56, 57, 58, 60, 61, 62, 63];
 
-/// The rivals that a data set allows, with a name and where they come from.
-pub fn all(is_raven: bool, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
+/// The rivals that a data set of an arm of a RAVEN-II, or of a table, allows, with a name and where they come from.
+pub fn all(arm: Option<Side>, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
     let every: Vec<usize> = (0..inputs).collect();
     let mut rivals: Vec<(&'static str, &'static str, Box<dyn Rival>)> = Vec::new();
-    if is_raven {
+    if let Some(side) = arm {
         rivals.push(("static map of posture", "random forest on the seven joints", Box::new(Forest::new(&POSTURE, seed))));
         rivals.push(("linear regression", "Peng 2024: all features", Box::new(Polynomial::linear(every))));
         rivals.push((
@@ -41,12 +47,24 @@ pub fn all(is_raven: bool, inputs: usize, seed: u64) -> Vec<(&'static str, &'sta
             "Mahler 2014: posture and speed, 600 inducing points",
             Box::new(Gaussian::of_raven(seed)),
         ));
+        rivals.push((
+            "dual unscented Kalman filter",
+            "Haghighipanah 2015: elastic cables, at the truth's rate",
+            Box::new(Kalman::of_raven(side)),
+        ));
+        rivals.push((
+            "gated recurrent unit",
+            "Cho 2014: reads what the default network sees of each state, without its memory, row by row",
+            Box::new(Recurrent::new(prepare::physical(), seed)),
+        ));
     } else {
         rivals.push(("linear regression", "all inputs", Box::new(Polynomial::linear(every.clone()))));
         if inputs <= 40 {
             rivals.push(("2nd-order polynomial", "all inputs", Box::new(Polynomial::second_order(every.clone()))));
         }
         rivals.push(("random forest", "all inputs", Box::new(Forest::new(&every, seed))));
+        let alone = every.iter().map(|input| vec![(*input, 1.0)]).collect();
+        rivals.push(("gated recurrent unit", "all inputs, row by row", Box::new(Recurrent::new(alone, seed))));
     }
     rivals
 }
