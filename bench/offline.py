@@ -60,8 +60,8 @@ def run(arguments, good=0):
 
 
 def gap(folder):
-    """A robot with dry friction that its simulation lacks: three joints, the whole library, all channels, 1 kHz. One that comes on the way
-    takes the most, since everything is tried in its window."""
+    """A robot with dry friction that its simulation lacks: three joints, the whole library, all channels, 1 kHz; and of friction that
+    comes on the way, for which everything is tried in a window as well."""
     robot = folder / "loose.toml"
     for number, (minutes, late) in enumerate([(1.25, ""), (5.0, ""), (5.0, "from_s = 100.0\n")]):
         robot.write_text(LOOSE + late)

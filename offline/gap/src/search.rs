@@ -450,34 +450,33 @@ impl Search<'_, '_> {
     /// How a sign turns round belongs to the joint and not to the law: rivals of the best claim, which round otherwise and do worse, begin
     /// again from its numbers. A search over one more number than it has starts seldom finds them.
     fn round_alike(&self, grams: &Grams, base: &Fit, claims: &mut [Scored]) {
-        let Some((best, rivals)) = claims.split_first_mut() else { return };
-        let own = &best.candidate;
+        let Some((Scored { candidate: own, score: best, .. }, rivals)) = claims.split_first_mut() else { return };
         let rounding: Vec<(&str, f64)> =
             own.family.shape.iter().copied().zip(own.shape.iter().copied()).filter(|(name, _)| rounds(name)).collect();
-        let least = ROUNDED * best.score;
+        if rounding.is_empty() {
+            return;
+        }
+        let least = (ROUNDED * *best).max(3.0);
         let alike = |family: &Family| {
             family.joints == own.family.joints
                 && family.form == own.family.form
                 && rounding.iter().all(|(name, _)| family.shape.contains(name))
         };
-        for rival in rivals.iter_mut().filter(|rival| !rounding.is_empty() && rival.score > least.max(3.0)) {
+        for rival in rivals.iter_mut().filter(|rival| rival.score > least) {
             let mut starts: Vec<Candidate> = Vec::new();
-            for start in &self.candidates {
-                if !start.same_claim(&rival.candidate) || !alike(&start.family) {
-                    continue;
-                }
+            for start in self.candidates.iter().filter(|start| start.same_claim(&rival.candidate) && alike(&start.family)) {
                 let mut shape = start.shape.clone();
                 for (name, value) in &rounding {
                     if let Some(k) = start.family.shape.iter().position(|own| own == name) {
                         shape[k] = *value;
                     }
                 }
-                let candidate = Candidate::new(self.dictionary, &start.family, &shape, rival.candidate.window);
-                if candidate.shows() && !starts.iter().any(|other| other.same_start(&candidate)) {
-                    starts.push(candidate);
+                // Many starts differ in nothing but the rounding.
+                if !starts.iter().any(|other| other.same_form(start) && other.shape == shape) {
+                    starts.push(Candidate::new(self.dictionary, &start.family, &shape, rival.candidate.window));
                 }
             }
-            let scored = starts.iter().filter_map(|start| self.score(grams, base, start));
+            let scored = starts.iter().filter(|start| start.shows()).filter_map(|start| self.score(grams, base, start));
             let Some(mut again) = scored.max_by(|a, b| a.score.total_cmp(&b.score)) else { continue };
             self.settle_shape(grams, base, &mut again);
             if again.score > rival.score {

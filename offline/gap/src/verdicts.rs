@@ -463,7 +463,7 @@ pub(crate) fn hold_up(
     (effects, estimates): (&[Effect], &[Estimate]),
     floors: &[f64],
 ) -> bool {
-    let [(effect, estimate), ..] = effects.iter().zip(estimates).collect::<Vec<_>>()[..] else { return true };
+    let Some((effect, estimate)) = effects.iter().zip(estimates).next() else { return true };
     let cell = main_cell(floors, &effect.chosen.candidate, &estimate.coefficients);
     let beside = &beside(problem, effects, estimates)[cell];
     corrected(problem, held_dictionary, (effects, estimates), beside, cell)

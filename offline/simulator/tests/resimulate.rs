@@ -97,7 +97,6 @@ fn commands_of_another_simulator_give_nearly_its_motion() {
     }
 }
 
-/// The robot with one more effect.
 /// Rows from `first` on.
 fn tail(found: &Simulated, first: usize) -> (Vec<f64>, Vec<Vector>, Vec<Vector>) {
     (found.time_s[first..].to_vec(), found.motors[first..].to_vec(), found.torque[first..].to_vec())
@@ -119,6 +118,7 @@ fn rows_that_are_not_kept_are_simulated_all_the_same() {
     }
 }
 
+/// The robot with one more effect.
 fn with(robot: &RobotModel, name: &str, numbers: &[(&str, f64)], bound: Bound, from_s: f64) -> RobotModel {
     let mut robot = robot.clone();
     let effect = Effect::new(physics(name, numbers), bound);

@@ -106,7 +106,7 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
 
 fn follow(model: &RobotModel, run: &resimulate::Run, file: &Path, seed: u64, watch: &Watch) -> Result<(), String> {
     let settle_s = if run.motors.is_some() { 0.0 } else { SETTLE_S };
-    let options = ClosedLoop { gains: None, seed, settle_s, from_s: 0.0 };
+    let options = ClosedLoop { seed, settle_s, ..ClosedLoop::default() };
     let found = closed_loop(model, run, options).map_err(|error| format!("{}: {error}", run.name))?;
     let mut table = Table::create(file, model, run.period_s(), &[("motion", "commands of a recording")])?;
     for row in 0..found.len() {

@@ -44,8 +44,8 @@ fn any(model: &RobotModel, run: &Run, commands: &Commands, options: ClosedLoop<'
             simulation.begin_with(commands.first(), &commands.first_rates(), &torque[0]);
         }
     }
-    let mut out = Simulated::new(model.joint_count(), run.rows_from(options.from_s));
     let mut sampler = Sampler::new(run, simulation.period_s(), options.from_s);
+    let mut out = Simulated::new(model.joint_count(), sampler.kept());
     while let Some(time_s) = sampler.next_tick_s() {
         let cycle = simulation.tick(&commands.at(time_s));
         sampler.take(&cycle, &mut out);
@@ -68,8 +68,8 @@ fn raven(
         simulation.start_at(&motors, &speeds);
     }
     let (gears, period_s) = (*arm.amplifiers.gear(), robot.raven.plant().sampling.period_s);
-    let mut out = Simulated::new(JOINTS, run.rows_from(options.from_s));
     let mut sampler = Sampler::new(run, period_s, options.from_s);
+    let mut out = Simulated::new(JOINTS, sampler.kept());
     while let Some(time_s) = sampler.next_tick_s() {
         let joints_d = narrow(&commands.at(time_s));
         let cycle = simulation.tick(&Command::Joints(joints_d));
@@ -104,7 +104,7 @@ fn wide(values: &[f64; JOINTS]) -> Vector {
 struct Sampler<'a> {
     run: &'a Run,
     period_s: f64,
-    from_s: f64,
+    kept_from: usize,
     tick: u64,
     row: usize,
     before: Option<ArmCycle>,
@@ -112,7 +112,12 @@ struct Sampler<'a> {
 
 impl<'a> Sampler<'a> {
     fn new(run: &'a Run, period_s: f64, from_s: f64) -> Self {
-        Self { run, period_s, from_s, tick: 0, row: 0, before: None }
+        Self { run, period_s, kept_from: run.row_from(from_s), tick: 0, row: 0, before: None }
+    }
+
+    /// Rows that are kept.
+    fn kept(&self) -> usize {
+        self.run.len() - self.kept_from
     }
 
     /// Time of the next cycle since the first row, s; none when every row is filled.
@@ -125,8 +130,7 @@ impl<'a> Sampler<'a> {
         let now_s = self.tick as f64 * self.period_s;
         while let Some(row_s) = self.run.time_s.get(self.row) {
             // How long before this cycle the row is, in periods.
-            let since_s = row_s - self.run.time_s[0];
-            let early = (now_s - since_s) / self.period_s;
+            let early = (now_s - (row_s - self.run.time_s[0])) / self.period_s;
             if early < -1e-6 {
                 break;
             }
@@ -134,7 +138,7 @@ impl<'a> Sampler<'a> {
                 Some(before) if early > 1e-6 => between(cycle, before, early.min(1.0)),
                 _ => *cycle,
             };
-            if since_s >= self.from_s {
+            if self.row >= self.kept_from {
                 out.push_cycle(*row_s, &found);
             }
             self.row += 1;

@@ -47,7 +47,8 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
     let timed = is_timed(model);
     let mut state = State::ZERO;
     let mut next_start_s = f64::NEG_INFINITY;
-    let mut out = Simulated::new(model.joint_count(), run.rows_from(options.from_s));
+    let kept_from = run.row_from(options.from_s);
+    let mut out = Simulated::new(model.joint_count(), run.len() - kept_from);
     for row in 0..run.len() {
         let time_s = run.time_s[row] - run.time_s[0];
         if timed {
@@ -58,7 +59,7 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
             next_start_s = time_s + options.window_s;
         }
         let seen = sensors.see(&state, time_s);
-        if time_s >= options.from_s {
+        if row >= kept_from {
             out.push(run.time_s[row], &seen, &torque[row]);
         }
         let Some(next_s) = run.time_s.get(row + 1) else { break };

@@ -78,9 +78,9 @@ impl Run {
         self.time_s.len()
     }
 
-    /// Rows not earlier than a time after the first, s.
-    pub(super) fn rows_from(&self, from_s: f64) -> usize {
-        self.time_s.iter().filter(|time_s| **time_s - self.time_s[0] >= from_s).count()
+    /// The first row not earlier than a time after the first one, s; as many as there are rows where all are.
+    pub(super) fn row_from(&self, from_s: f64) -> usize {
+        self.time_s.partition_point(|time_s| time_s - self.time_s[0] < from_s)
     }
 
     /// Has it no row?

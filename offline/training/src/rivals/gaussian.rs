@@ -46,17 +46,6 @@ impl Gaussian {
         }
     }
 
-    fn inputs<'a>(&self, chosen: impl Iterator<Item = &'a [f32]>) -> Array2<f64> {
-        let (mut x, mut all) = (Vec::new(), Vec::new());
-        let mut n = 0;
-        for row in chosen {
-            self.standard.of(row, &mut x);
-            all.extend_from_slice(&x);
-            n += 1;
-        }
-        Array2::from_shape_vec((n, self.standard.width()), all).unwrap_or_default()
-    }
-
     /// Kernel between rows and inducing points.
     fn kernel(&self, x: &Array2<f64>, length: f64) -> Array2<f64> {
         let squares = |m: &Array2<f64>| m.rows().into_iter().map(|row| row.dot(&row)).collect::<Vec<f64>>();
@@ -98,7 +87,7 @@ impl Rival for Gaussian {
         pairs.truncate(ROWS_MAX);
         let n = pairs.len().max(1) as f64;
         self.mean = (0..outputs).map(|axis| pairs.iter().map(|(_, y)| f64::from(y[axis])).sum::<f64>() / n).collect();
-        let x = self.inputs(pairs.iter().map(|(row, _)| *row));
+        let x = self.standard.of_all(pairs.iter().map(|(row, _)| *row));
         let y = Array2::from_shape_fn((pairs.len(), outputs), |(r, c)| f64::from(pairs[r].1[c]) - self.mean[c]);
         self.inducing = x.slice(ndarray::s![..INDUCING.min(x.nrows()), ..]).to_owned();
         let cut = (x.nrows() as f64 * CHOOSING) as usize;
@@ -119,7 +108,7 @@ impl Rival for Gaussian {
         let all: Vec<&[f32]> = rows(one).collect();
         let mut out = Vec::new();
         for rows in all.chunks(CHUNK_ROWS) {
-            let y = self.kernel(&self.inputs(rows.iter().copied()), self.length).dot(&self.weights);
+            let y = self.kernel(&self.standard.of_all(rows.iter().copied()), self.length).dot(&self.weights);
             out.extend(
                 y.rows()
                     .into_iter()

@@ -2,11 +2,12 @@
 //! cables by encoders and torque, the other the cables' numbers by the truth, each with what the other believes. The published one runs
 //! at the controller's rate along the motors' dynamics; here both run at the rows of the truth, at which the cables have settled.
 
-use super::{Rival, rows};
+use super::{POSTURE, Rival, rows};
 use crate::data::Trajectory;
 use arm::serial::{SerialArm, Workspace};
-use arm::{Joints, RIGID_JOINTS, Raven2, Side};
+use arm::{Joints, Motors, RIGID_JOINTS, Raven2, Side};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use ravenpose::load::{MVEL, TAU};
 
 const N: usize = RIGID_JOINTS;
 /// Links: position, rate, and torque at the capstan that no model explains.
@@ -14,11 +15,6 @@ const STATE: usize = 3 * N;
 /// Cables: offset of the joint, logarithm of the compliance, dry friction at the capstan; and how heavy the links are, times nominal.
 const NUMBERS: usize = 3 * N + 1;
 const MEASURED: usize = 2 * N;
-/// Slots of `raven118-v1` of joints 1 to 3 and of the tool, and first features of their fields.
-const SLOTS: [usize; 7] = [0, 1, 2, 4, 5, 6, 7];
-const TAU: usize = 40;
-const JPOS: usize = 56;
-const MVEL: usize = 64;
 /// Rows further apart than that are two runs, s.
 const APART_S: f64 = 0.5;
 /// Every so-manieth row of training moves the cables' numbers: neighbours say the same.
@@ -86,6 +82,23 @@ struct Seen {
     speed: [f64; N],
 }
 
+impl Seen {
+    /// Links 1 to 3 as the motors say them.
+    fn motors(&self) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.joints[..N])
+    }
+}
+
+/// Three numbers of many.
+fn three<const D: usize>(numbers: &SVector<f64, D>, from: usize) -> Vector3<f64> {
+    numbers.fixed_rows::<N>(from).into_owned()
+}
+
+/// Positions and torques of one measurement.
+fn beside(positions: Vector3<f64>, torque: Vector3<f64>) -> SVector<f64, MEASURED> {
+    SVector::from_fn(|k, _| k.checked_sub(N).map_or_else(|| positions[k], |i| torque[i]))
+}
+
 /// The filter and what it needs of the arm.
 pub struct Kalman {
     arm: arm::Arm,
@@ -102,10 +115,10 @@ impl Kalman {
     pub fn of_raven(side: Side) -> Self {
         let (model, arm) = (Raven2::nominal(), Raven2::nominal().arm(side));
         let ratio = *arm.transmission.ratio();
-        let coupling = Matrix3::from_fn(|drive, joint| {
-            let mut joints = Joints::default();
-            joints[joint] = 1.0;
-            arm.transmission.motors(&joints)[drive] / ratio[drive]
+        let inverse = Matrix3::from_fn(|joint, drive| {
+            let mut motors = Motors::default();
+            motors[drive] = ratio[drive];
+            arm.transmission.joints(&motors)[joint]
         });
         let gear = model.plant().transmission.gear_big;
         let cable = &model.plant().cable;
@@ -122,7 +135,7 @@ impl Kalman {
         (mean[3 * N], sd[3 * N]) = (1.0, 0.1);
         Self {
             body: model.rigid_body(side),
-            inverse: coupling.try_inverse().unwrap_or_else(Matrix3::identity),
+            inverse,
             share: std::array::from_fn(|i| gear / ratio[i]),
             numbers: Belief::new(mean, &sd),
             arm,
@@ -132,7 +145,7 @@ impl Kalman {
     fn seen(one: &Trajectory) -> impl Iterator<Item = Seen> + '_ {
         rows(one).zip(&one.time_s).map(|(row, time_s)| Seen {
             time_s: *time_s,
-            joints: SLOTS.map(|slot| f64::from(row[JPOS + slot]).to_radians()),
+            joints: POSTURE.map(|feature| f64::from(row[feature]).to_radians()),
             torque: std::array::from_fn(|i| f64::from(row[TAU + i])),
             speed: std::array::from_fn(|i| f64::from(row[MVEL + i]).to_radians()),
         })
@@ -145,7 +158,23 @@ impl Kalman {
         self.inverse.transpose() * Vector3::from(load) * weight
     }
 
-    /// Where the motors say that links are which stand at `position`, rad and m, and the torque at the capstans.
+    /// How far links stay behind their motors, rad and m: offset, and stretch of the cables under what they carry; and the torque that
+    /// it takes at the capstans, N·m.
+    fn carried(
+        &self,
+        ws: &mut Workspace,
+        state: &SVector<f64, STATE>,
+        numbers: &SVector<f64, NUMBERS>,
+        speed: &[f64; N],
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let drives = self.drives(ws, &three(state, 0), &three(state, N), numbers[3 * N]);
+        let carried = Vector3::from_fn(|i, _| drives[i] + state[2 * N + i] / self.share[i]);
+        let stretch = Vector3::from_fn(|i, _| numbers[N + i].exp() * carried[i]);
+        let torque = Vector3::from_fn(|i, _| carried[i] * self.share[i] + numbers[2 * N + i] * (speed[i] / TURN).tanh());
+        (three(numbers, 0) + self.inverse * stretch, torque)
+    }
+
+    /// Where the motors say that the links are, rad and m, and the torque at the capstans.
     fn measured(
         &self,
         ws: &mut Workspace,
@@ -153,21 +182,8 @@ impl Kalman {
         numbers: &SVector<f64, NUMBERS>,
         speed: &[f64; N],
     ) -> SVector<f64, MEASURED> {
-        let part = |from: usize| Vector3::new(state[from], state[from + 1], state[from + 2]);
-        let (position, unexplained) = (part(0), part(2 * N));
-        let drives = self.drives(ws, &position, &part(N), numbers[3 * N]);
-        let carried = Vector3::from_fn(|i, _| drives[i] + unexplained[i] / self.share[i]);
-        let motors = position + self.behind(numbers, &carried);
-        SVector::from_fn(|k, _| match k.checked_sub(N) {
-            None => motors[k],
-            Some(i) => carried[i] * self.share[i] + numbers[2 * N + i] * (speed[i] / TURN).tanh(),
-        })
-    }
-
-    /// How far links stay behind their motors: offset, and stretch of the cables under what they carry, joint units.
-    fn behind(&self, numbers: &SVector<f64, NUMBERS>, carried: &Vector3<f64>) -> Vector3<f64> {
-        let stretch = Vector3::from_fn(|i, _| numbers[N + i].exp() * carried[i]);
-        Vector3::new(numbers[0], numbers[1], numbers[2]) + self.inverse * stretch
+        let (behind, torque) = self.carried(ws, state, numbers, speed);
+        beside(three(state, 0) + behind, torque)
     }
 
     /// The links at the first row: where the motors are.
@@ -202,10 +218,7 @@ impl Kalman {
             }
             _ => Self::begun(seen),
         };
-        let measured = SVector::from_fn(|k, _| match k.checked_sub(N) {
-            None => seen.joints[k],
-            Some(i) => seen.torque[i],
-        });
+        let measured = beside(seen.motors(), seen.torque.into());
         let sd = SVector::from_column_slice(&[3e-4, 3e-4, 3e-5, 0.03, 0.03, 0.03]);
         let numbers = self.numbers.mean;
         links.measure::<MEASURED>(&measured, &sd, |state| self.measured(ws, state, &numbers, &seen.speed));
@@ -221,10 +234,7 @@ impl Kalman {
 
     /// The cables' numbers, by the truth at a row and by its torque.
     fn learn(&mut self, ws: &mut Workspace, links: &Belief<STATE>, seen: &Seen, label: &[f32]) {
-        let measured = SVector::<f64, MEASURED>::from_fn(|k, _| match k.checked_sub(N) {
-            None => f64::from(label[k]),
-            Some(i) => seen.torque[i],
-        });
+        let measured = beside(Vector3::from_fn(|axis, _| f64::from(label[axis])), seen.torque.into());
         // Play and memory of the cables, which it does not have, leave a millimetre.
         let sd = SVector::from_column_slice(&[1.0, 1.0, 1.0, 0.05, 0.05, 0.05]);
         let mut numbers = self.numbers.clone();
@@ -233,17 +243,9 @@ impl Kalman {
             let sd: f64 = [2e-6, 1e-3, 1e-5, 1e-4][k / N];
             sd * sd
         }));
-        let state = links.mean;
-        let part = |from: usize| Vector3::new(state[from], state[from + 1], state[from + 2]);
         numbers.measure::<MEASURED>(&measured, &sd, |numbers| {
-            let drives = self.drives(ws, &part(0), &part(N), numbers[3 * N]);
-            let carried = Vector3::from_fn(|i, _| drives[i] + state[2 * N + i] / self.share[i]);
-            let motors = Vector3::new(seen.joints[0], seen.joints[1], seen.joints[2]);
-            let shift = self.shift(&seen.joints, &(motors - self.behind(numbers, &carried)));
-            SVector::from_fn(|k, _| match k.checked_sub(N) {
-                None => shift[k],
-                Some(i) => carried[i] * self.share[i] + numbers[2 * N + i] * (seen.speed[i] / TURN).tanh(),
-            })
+            let (behind, torque) = self.carried(ws, &links.mean, numbers, &seen.speed);
+            beside(self.shift(&seen.joints, &(seen.motors() - behind)), torque)
         });
         self.numbers = numbers;
     }
@@ -270,8 +272,7 @@ impl Rival for Kalman {
         let mut out = Vec::with_capacity(3 * one.rows());
         for seen in Self::seen(one) {
             let now = self.follow(&mut ws, links.take(), &seen);
-            let there = Vector3::new(now.mean[0], now.mean[1], now.mean[2]);
-            out.extend(self.shift(&seen.joints, &there).iter().map(|part| *part as f32));
+            out.extend(self.shift(&seen.joints, &three(&now.mean, 0)).iter().map(|part| *part as f32));
             links = Some((seen.time_s, now));
         }
         out
@@ -308,7 +309,7 @@ mod tests {
             let mut joints = Joints::default();
             for i in 0..N {
                 joints[i] = measured[i];
-                row[JPOS + i] = measured[i].to_degrees() as f32;
+                row[POSTURE[i]] = measured[i].to_degrees() as f32;
                 row[TAU + i] = measured[N + i] as f32;
             }
             one.time_s.push(t);

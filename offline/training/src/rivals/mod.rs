@@ -10,6 +10,7 @@ mod rigid;
 use crate::data::Trajectory;
 use crate::prepare;
 use arm::Side;
+use ndarray::Array2;
 
 pub use forest::Forest;
 pub use gaussian::Gaussian;
@@ -104,6 +105,16 @@ impl Standard {
 
     pub(crate) fn width(&self) -> usize {
         self.columns.len()
+    }
+
+    /// Rows of inputs as a matrix.
+    pub(crate) fn of_all<'a>(&self, rows: impl Iterator<Item = &'a [f32]>) -> Array2<f64> {
+        let (mut x, mut all) = (Vec::new(), Vec::new());
+        for row in rows {
+            self.of(row, &mut x);
+            all.extend_from_slice(&x);
+        }
+        Array2::from_shape_vec((all.len() / self.width().max(1), self.width()), all).unwrap_or_default()
     }
 
     pub(crate) fn of(&self, row: &[f32], to: &mut Vec<f64>) {

@@ -3,8 +3,9 @@
 
 use super::{Rival, Standard, rows};
 use crate::data::Trajectory;
-use crate::network::Adam;
+use crate::network::{Activation, Adam};
 use crate::random::Random;
+use crate::train::label_statistics;
 use ndarray::{Array1, Array2, ArrayView2, Axis, linalg::general_mat_mul, s};
 
 /// Numbers that it remembers.
@@ -90,12 +91,11 @@ impl Cell {
         let mut around = Array2::zeros((before.nrows(), 3 * h));
         general_mat_mul(1.0, before, &self.u.t(), 0.0, &mut around);
         let gate = |from: usize| {
-            let sum = &inwards.slice(s![.., from..from + h]) + &around.slice(s![.., from..from + h]);
-            sum.mapv_into(|x| 1.0 / (1.0 + (-x).exp()))
+            activated(&inwards.slice(s![.., from..from + h]) + &around.slice(s![.., from..from + h]), Activation::Sigmoid)
         };
         let (z, r) = (gate(0), gate(h));
         let recalled = &around.slice(s![.., 2 * h..]) + &self.c;
-        let n = (&inwards.slice(s![.., 2 * h..]) + &(&r * &recalled)).mapv_into(f32::tanh);
+        let n = activated(&inwards.slice(s![.., 2 * h..]) + &(&r * &recalled), Activation::Tanh);
         let after = &n + &(&z * &(before - &n));
         Step { before: before.clone(), z, r, n, recalled, after }
     }
@@ -150,6 +150,11 @@ impl Cell {
     }
 }
 
+fn activated(mut sums: Array2<f32>, activation: Activation) -> Array2<f32> {
+    activation.apply(sums.as_slice_memory_order_mut().unwrap_or_default());
+    sums
+}
+
 /// Which of [`Cell::numbers`] are weights.
 const WEIGHTS: [bool; 6] = [true, false, true, false, true, false];
 
@@ -174,12 +179,7 @@ impl Recurrent {
     }
 
     fn inputs(&self, one: &Trajectory) -> Array2<f32> {
-        let (mut row, mut all) = (Vec::new(), Vec::new());
-        for raw in rows(one) {
-            self.standard.of(raw, &mut row);
-            all.extend(row.iter().map(|x| *x as f32));
-        }
-        Array2::from_shape_vec((one.rows(), self.standard.width()), all).unwrap_or_default()
+        self.standard.of_all(rows(one)).mapv(|x| x as f32)
     }
 
     fn pieces(&self, train: &[Trajectory], outputs: usize) -> Vec<Piece> {
@@ -238,11 +238,7 @@ impl Recurrent {
 impl Rival for Recurrent {
     fn fit(&mut self, train: &[Trajectory], outputs: usize) {
         self.standard = Standard::fit(self.columns.clone(), train);
-        let labels = || train.iter().flat_map(|one| one.labels.chunks_exact(outputs.max(1)));
-        let n = labels().count().max(1) as f64;
-        self.mean = (0..outputs).map(|axis| labels().map(|label| f64::from(label[axis])).sum::<f64>() / n).collect();
-        let squares = labels().flat_map(|label| label.iter().zip(&self.mean).map(|(y, mean)| (f64::from(*y) - mean).powi(2)));
-        self.scale = (squares.sum::<f64>() / (n * outputs.max(1) as f64)).sqrt().max(1e-12);
+        (self.mean, self.scale) = label_statistics(train, outputs);
         let mut random = Random::new(self.seed, PURPOSE);
         self.cell = Cell::new(self.standard.width(), HIDDEN, outputs, &mut random);
         let lengths: Vec<usize> = self.cell.numbers().iter().map(|numbers| numbers.len()).collect();

@@ -140,7 +140,7 @@ pub fn train(
 }
 
 /// Mean per output, and one scale for all: the RMS deviation over all outputs.
-fn label_statistics(train: &[Trajectory], outputs: usize) -> (Vec<f64>, f64) {
+pub(crate) fn label_statistics(train: &[Trajectory], outputs: usize) -> (Vec<f64>, f64) {
     let labels = || train.iter().flat_map(|one| one.labels.chunks_exact(outputs.max(1)));
     let n = labels().count().max(1) as f64;
     let mut mean = vec![0.0; outputs];
