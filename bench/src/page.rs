@@ -16,7 +16,7 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
-- *avx512vnni*, *avx2+fma*: whole-number sums for i16 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
+- *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
 - *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
 - The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth

@@ -99,12 +99,6 @@ impl Format {
 /// `127 * 256 + 127`: the largest number whose two balanced digits both fit in a signed byte.
 pub(super) const LARGEST_DIGITS: f32 = 32_639.0;
 
-/// `number = 256 * high + low` with both digits in [-128, 127].
-pub(super) fn digits(number: i32) -> (i32, i32) {
-    let high = (number + 128) >> 8;
-    (high, number - (high << 8))
-}
-
 /// To binary16, to nearest, ties to even.
 fn to_f16(value: f32) -> u16 {
     let bits = value.to_bits();
@@ -189,14 +183,6 @@ mod tests {
             assert_eq!(to_bf16(value), bits);
         }
         assert!(f32::from_bits(u32::from(to_bf16(f32::from_bits(0x7f80_0001))) << 16).is_nan());
-    }
-
-    #[test]
-    fn digits_make_up_their_number() {
-        for number in -32_639..=32_639 {
-            let (high, low) = digits(number);
-            assert!(256 * high + low == number && (-128..128).contains(&high) && (-128..128).contains(&low), "{number}");
-        }
     }
 
     #[test]

@@ -21,11 +21,13 @@ pub(super) fn bytes_of(lines: &[Line]) -> &[u8] {
     unsafe { std::slice::from_raw_parts(lines.as_ptr().cast(), size_of_val(lines)) }
 }
 
-/// Instruction sets that the kernels are written for, each including the one before.
+/// Instruction sets that the kernels are written for; of one architecture, each includes the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InstructionSet {
-    /// Plain Rust, left to the compiler's baseline (SSE2, NEON).
+    /// Plain Rust, left to the compiler's baseline.
     Portable,
+    /// NEON, which every 64-bit Arm has.
+    Neon,
     /// AVX2 with FMA and F16C.
     Avx2,
     /// AVX-512F.
@@ -35,8 +37,13 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// All of them, narrowest first.
-    pub const ALL: [Self; 4] = [Self::Portable, Self::Avx2, Self::Avx512, Self::Avx512Vnni];
+    /// All of them, of each architecture narrowest first.
+    const ALL: [Self; 5] = [Self::Portable, Self::Neon, Self::Avx2, Self::Avx512, Self::Avx512Vnni];
+
+    /// Those that this machine has, narrowest first: [`Self::Portable`] at least.
+    pub fn present() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|set| set.available() == *set)
+    }
 
     /// The widest that this machine has.
     pub fn best() -> Self {
@@ -60,6 +67,9 @@ impl InstructionSet {
                 return Self::Avx2;
             }
         }
+        if cfg!(target_arch = "aarch64") && self >= Self::Neon {
+            return Self::Neon;
+        }
         Self::Portable
     }
 
@@ -67,6 +77,7 @@ impl InstructionSet {
     pub fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
+            Self::Neon => "neon",
             Self::Avx2 => "avx2+fma",
             Self::Avx512 => "avx512f",
             Self::Avx512Vnni => "avx512vnni",

@@ -7,7 +7,6 @@ mod activation;
 mod deviation;
 mod format;
 mod instructions;
-#[cfg(target_arch = "x86_64")]
 mod pairs;
 mod rows;
 #[cfg(target_arch = "x86_64")]
@@ -19,10 +18,9 @@ pub use format::{Format, UnknownFormat};
 pub use instructions::InstructionSet;
 
 use instructions::{LANE, Lane, Line, bytes_of};
-#[cfg(target_arch = "x86_64")]
 use pairs::{Numbers, Pairs};
 use ravenpose_importer::{Activation, Dense, Network};
-use rows::Rows;
+use rows::{Float, Rows};
 #[cfg(target_arch = "x86_64")]
 use tiles::{Digits, Tiles};
 
@@ -42,7 +40,6 @@ const MEAN_INPUTS: usize = 64;
 
 enum Weights {
     Rows(Rows),
-    #[cfg(target_arch = "x86_64")]
     Pairs(Pairs),
     #[cfg(target_arch = "x86_64")]
     Tiles(Tiles),
@@ -68,7 +65,6 @@ pub struct Plan {
     back: Box<[Lane]>,
     #[cfg(target_arch = "x86_64")]
     digits: Digits,
-    #[cfg(target_arch = "x86_64")]
     numbers: Numbers,
     instruction_set: InstructionSet,
     format: Format,
@@ -140,7 +136,6 @@ impl Plan {
             back: zeros(widest),
             #[cfg(target_arch = "x86_64")]
             digits: Digits::new(widest),
-            #[cfg(target_arch = "x86_64")]
             numbers: Numbers::new(widest),
             instruction_set,
             format,
@@ -210,8 +205,9 @@ impl Plan {
         for layer in &self.layers {
             match &layer.weights {
                 Weights::Rows(rows) => rows.run(self.instruction_set, &layer.bias, &self.front, &mut self.back),
-                #[cfg(target_arch = "x86_64")]
-                Weights::Pairs(pairs) => pairs.run(&layer.bias, &self.front, &mut self.numbers, &mut self.back),
+                Weights::Pairs(pairs) => {
+                    pairs.run(self.instruction_set, &layer.bias, &self.front, &mut self.numbers, &mut self.back);
+                }
                 #[cfg(target_arch = "x86_64")]
                 Weights::Tiles(tiles) => tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back),
             }
@@ -242,25 +238,23 @@ impl Layer {
 }
 
 impl Weights {
+    #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "one layout for all that they have"))]
     fn new(weights: &[f32], inputs: usize, set: InstructionSet, format: Format) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if matches!(format, Format::I16 | Format::I8) {
-            match set {
-                InstructionSet::Portable => {}
-                InstructionSet::Avx512Vnni if inputs <= TILES_INPUTS_MAX => {
-                    return Self::Tiles(Tiles::new(weights, inputs, format));
-                }
-                _ => return Self::Pairs(Pairs::new(weights, inputs, format)),
+        match format {
+            Format::F32 => Self::Rows(Rows::new(weights, inputs, Float::F32)),
+            Format::F16 => Self::Rows(Rows::new(weights, inputs, Float::F16)),
+            Format::Bf16 => Self::Rows(Rows::new(weights, inputs, Float::Bf16)),
+            #[cfg(target_arch = "x86_64")]
+            Format::I16 | Format::I8 if set == InstructionSet::Avx512Vnni && inputs <= TILES_INPUTS_MAX => {
+                Self::Tiles(Tiles::new(weights, inputs, format))
             }
+            Format::I16 | Format::I8 => Self::Pairs(Pairs::new(weights, inputs, format)),
         }
-        let _ = set;
-        Self::Rows(Rows::new(weights, inputs, format))
     }
 
     fn lines(&self) -> &[Line] {
         match self {
             Self::Rows(rows) => rows.lines(),
-            #[cfg(target_arch = "x86_64")]
             Self::Pairs(pairs) => pairs.lines(),
             #[cfg(target_arch = "x86_64")]
             Self::Tiles(tiles) => tiles.lines(),

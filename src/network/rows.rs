@@ -1,4 +1,4 @@
-//! Matrix times vector in float32, four rows at a time, for each instruction set; in plain Rust also of weights that are whole numbers.
+//! Matrix times vector in float32, four rows at a time, for each instruction set.
 //!
 //! The weights of four rows lie interleaved by lanes of sixteen, in the order in which they are read: one stream from the first byte
 //! to the last.
@@ -12,20 +12,39 @@ use super::instructions::{InstructionSet, LANE, Lane, Line, bytes_of};
 /// Rows worked on together.
 const ROWS: usize = 4;
 
+/// How weights are stored here.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Float {
+    F32,
+    F16,
+    Bf16,
+}
+
+impl Float {
+    fn format(self) -> Format {
+        match self {
+            Self::F32 => Format::F32,
+            Self::F16 => Format::F16,
+            Self::Bf16 => Format::Bf16,
+        }
+    }
+}
+
 /// A layer's weights.
 pub(super) struct Rows {
     lines: Box<[Line]>,
     /// Lanes of one row.
     row_lanes: usize,
     height: usize,
-    format: Format,
+    float: Float,
     /// One per row, by lanes; rows that pad have 0.
     scale: Box<[Lane]>,
 }
 
 impl Rows {
     /// Packs `weights`, row by row of `inputs` numbers.
-    pub(super) fn new(weights: &[f32], inputs: usize, format: Format) -> Self {
+    pub(super) fn new(weights: &[f32], inputs: usize, float: Float) -> Self {
+        let format = float.format();
         let given = weights.len() / inputs.max(1);
         let rows = given.next_multiple_of(ROWS);
         let row_lanes = inputs.div_ceil(LANE);
@@ -41,7 +60,7 @@ impl Rows {
                 lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&format.encode(*weight, row_scale)[..bytes]);
             }
         }
-        Self { lines, row_lanes, height: rows, format, scale }
+        Self { lines, row_lanes, height: rows, float, scale }
     }
 
     pub(super) fn lines(&self) -> &[Line] {
@@ -52,7 +71,7 @@ impl Rows {
     pub(super) fn run(&self, set: InstructionSet, bias: &[Lane], input: &[Lane], output: &mut [Lane]) {
         let lanes = self.height.div_ceil(LANE);
         assert!(
-            self.lines.len() * 64 >= self.height * self.row_lanes * LANE * self.format.bytes()
+            self.lines.len() * 64 >= self.height * self.row_lanes * LANE * self.float.format().bytes()
                 && self.height.is_multiple_of(ROWS)
                 && self.scale.len() == lanes
                 && bias.len() >= lanes
@@ -68,6 +87,9 @@ impl Rows {
             // SAFETY: as above, with AVX2, FMA and F16C.
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 => unsafe { x86::narrow(self, input, out) },
+            // SAFETY: as above; every aarch64 has NEON.
+            #[cfg(target_arch = "aarch64")]
+            InstructionSet::Neon => unsafe { neon::run(self, input, out) },
             _ => self.portable(input, out),
         }
         for ((out, scale), bias) in out.iter_mut().zip(&*self.scale).zip(bias) {
@@ -79,12 +101,10 @@ impl Rows {
 
     fn portable(&self, input: &[Lane], output: &mut [Lane]) {
         let two = |bytes: &[u8; 2]| u16::from_le_bytes(*bytes);
-        match self.format {
-            Format::F32 => self.sums(input, output, |bytes: &[u8; 4]| f32::from_le_bytes(*bytes)),
-            Format::F16 => self.sums(input, output, |bytes| from_f16(two(bytes))),
-            Format::Bf16 => self.sums(input, output, |bytes| f32::from_bits(u32::from(two(bytes)) << 16)),
-            Format::I16 => self.sums(input, output, |bytes| f32::from(two(bytes).cast_signed())),
-            Format::I8 => self.sums(input, output, |bytes: &[u8; 1]| f32::from(bytes[0].cast_signed())),
+        match self.float {
+            Float::F32 => self.sums(input, output, |bytes: &[u8; 4]| f32::from_le_bytes(*bytes)),
+            Float::F16 => self.sums(input, output, |bytes| from_f16(two(bytes))),
+            Float::Bf16 => self.sums(input, output, |bytes| f32::from_bits(u32::from(two(bytes)) << 16)),
         }
     }
 
@@ -117,7 +137,7 @@ impl Rows {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Format, LANE, Lane, ROWS, Rows};
+    use super::{Float, LANE, Lane, ROWS, Rows};
     #[allow(clippy::wildcard_imports, reason = "vector instructions")]
     use std::arch::x86_64::*;
 
@@ -127,12 +147,10 @@ mod x86 {
     pub(super) unsafe fn wide(rows: &Rows, input: &[Lane], output: &mut [Lane]) {
         // SAFETY: the caller's promise, passed on.
         unsafe {
-            match rows.format {
-                Format::F32 => wide_f32(rows, input, output),
-                Format::F16 => wide_f16(rows, input, output),
-                Format::Bf16 => wide_bf16(rows, input, output),
-                // Not made: whole numbers have kernels of their own (`pairs`, `tiles`).
-                Format::I16 | Format::I8 => rows.portable(input, output),
+            match rows.float {
+                Float::F32 => wide_f32(rows, input, output),
+                Float::F16 => wide_f16(rows, input, output),
+                Float::Bf16 => wide_bf16(rows, input, output),
             }
         }
     }
@@ -143,12 +161,10 @@ mod x86 {
     pub(super) unsafe fn narrow(rows: &Rows, input: &[Lane], output: &mut [Lane]) {
         // SAFETY: the caller's promise, passed on.
         unsafe {
-            match rows.format {
-                Format::F32 => narrow_f32(rows, input, output),
-                Format::F16 => narrow_f16(rows, input, output),
-                Format::Bf16 => narrow_bf16(rows, input, output),
-                // As above.
-                Format::I16 | Format::I8 => rows.portable(input, output),
+            match rows.float {
+                Float::F32 => narrow_f32(rows, input, output),
+                Float::F16 => narrow_f16(rows, input, output),
+                Float::Bf16 => narrow_bf16(rows, input, output),
             }
         }
     }
@@ -257,4 +273,67 @@ mod x86 {
     narrow!(narrow_bf16, 2, |at| {
         _mm256_castsi256_ps(_mm256_slli_epi32::<16>(_mm256_cvtepu16_epi32(_mm_load_si128(at.cast()))))
     });
+}
+
+#[cfg(target_arch = "aarch64")]
+mod neon {
+    use super::{Float, LANE, Lane, ROWS, Rows};
+    #[allow(clippy::wildcard_imports, reason = "vector instructions")]
+    use std::arch::aarch64::*;
+
+    /// Numbers in a register.
+    const QUARTER: usize = 4;
+    /// Registers to a lane.
+    const QUARTERS: usize = LANE / QUARTER;
+
+    /// # Safety
+    /// The lengths must be as `Rows::run` checks them.
+    #[target_feature(enable = "neon")]
+    pub(super) unsafe fn run(rows: &Rows, input: &[Lane], output: &mut [Lane]) {
+        // SAFETY: the caller's promise, passed on.
+        unsafe {
+            match rows.float {
+                Float::F32 => run_f32(rows, input, output),
+                Float::F16 => run_f16(rows, input, output),
+                Float::Bf16 => run_bf16(rows, input, output),
+            }
+        }
+    }
+
+    macro_rules! neon {
+        ($name:ident, $bytes:literal, |$at:ident| $load:expr) => {
+            /// # Safety
+            /// As [`run`].
+            #[target_feature(enable = "neon")]
+            unsafe fn $name(rows: &Rows, input: &[Lane], output: &mut [Lane]) {
+                const STEP: usize = LANE * $bytes;
+                let x = input.as_ptr().cast::<f32>();
+                let out = output.as_mut_ptr().cast::<f32>();
+                // SAFETY: as for the kernels of x86, with a quarter of a lane at a time.
+                unsafe {
+                    let load = |$at: *const u8| $load;
+                    let mut w = rows.lines.as_ptr().cast::<u8>();
+                    for group in 0..rows.height / ROWS {
+                        let mut sums = [[vdupq_n_f32(0.0); QUARTERS]; ROWS];
+                        for lane in 0..rows.row_lanes {
+                            let x: [_; QUARTERS] = std::array::from_fn(|at| vld1q_f32(x.add(lane * LANE + at * QUARTER)));
+                            for (row, sums) in sums.iter_mut().enumerate() {
+                                let w = w.add(row * STEP);
+                                for (at, sum) in sums.iter_mut().enumerate() {
+                                    *sum = vfmaq_f32(*sum, load(w.add(at * QUARTER * $bytes)), x[at]);
+                                }
+                            }
+                            w = w.add(ROWS * STEP);
+                        }
+                        let [a, b, c, d] = sums.map(|[a, b, c, d]| vaddq_f32(vaddq_f32(a, b), vaddq_f32(c, d)));
+                        vst1q_f32(out.add(group * ROWS), vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d)));
+                    }
+                }
+            }
+        };
+    }
+
+    neon!(run_f32, 4, |at| vld1q_f32(at.cast()));
+    neon!(run_f16, 2, |at| vcvt_f32_f16(vreinterpret_f16_u16(vld1_u16(at.cast()))));
+    neon!(run_bf16, 2, |at| vreinterpretq_f32_u32(vshll_n_u16::<16>(vld1_u16(at.cast()))));
 }

@@ -14,13 +14,19 @@
 #[allow(clippy::wildcard_imports, reason = "vector instructions")]
 use std::arch::x86_64::*;
 
-use super::format::{Format, LARGEST_DIGITS, digits};
+use super::format::{Format, LARGEST_DIGITS};
 use super::instructions::{InstructionSet, LANE, Lane, Line};
 
 /// Inputs of a tile.
 const DEPTH: usize = 4;
 /// Most tiles side by side.
 const WIDTH: usize = 8;
+
+/// `number = 256 * high + low` with both digits in [-128, 127].
+fn digits(number: i32) -> (i32, i32) {
+    let high = (number + 128) >> 8;
+    (high, number - (high << 8))
+}
 
 /// Activations as digits, for [`Tiles::run`].
 pub(super) struct Digits {
@@ -202,6 +208,19 @@ impl Tiles {
                 let factor = _mm512_mul_ps(scale, _mm512_load_ps(self.scale[at].0.as_ptr()));
                 _mm512_store_ps(output[at].0.as_mut_ptr(), _mm512_fmadd_ps(sum, factor, _mm512_load_ps(bias[at].0.as_ptr())));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::digits;
+
+    #[test]
+    fn digits_make_up_their_number() {
+        for number in -32_639..=32_639 {
+            let (high, low) = digits(number);
+            assert!(256 * high + low == number && (-128..128).contains(&high) && (-128..128).contains(&low), "{number}");
         }
     }
 }
