@@ -8,14 +8,14 @@ use crate::cycle::{Cycle, Estimator, Limits, Stopwatch};
 use crate::histogram::{Recorder, Stage};
 use crate::phase::{Found, PhaseLock};
 use crate::shared::{Event, EventSender, LinkCounters, Shared};
-use ravenpose_transport::{Listener, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{DEPTH_MAX, Listener, Loan, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ARMS, CorrectedPose, FALLBACK_REASONS, RavenState};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
-/// Depth of the state queue: a backlog is skipped, but counted exactly up to this depth.
-const QUEUE: usize = 64;
+/// Depth of the state queue, the largest: a backlog is skipped, and counted as such up to this depth. Virtual machines stop for 0.1 s.
+const QUEUE: usize = DEPTH_MAX;
 /// After this many periods without a state the loop stops polling around the expected time and looks once per period.
 const MISSES_MAX: u32 = 50;
 
@@ -59,6 +59,8 @@ enum Waited {
 }
 
 struct Link {
+    /// Taken while there was nothing else to do; before the writer, so that it is given back first.
+    next: Option<Loan<CorrectedPose>>,
     reader: Reader<RavenState>,
     writer: Writer<CorrectedPose>,
     listener: Option<Listener>,
@@ -67,11 +69,29 @@ struct Link {
 impl Link {
     fn open(settings: &Settings, wait: Wait) -> Result<Self, TransportError> {
         Ok(Self {
+            next: None,
             // The pose first: its one publisher's place tells whether another service runs.
             writer: Writer::open(settings)?,
             reader: Reader::open(settings, QUEUE)?,
             listener: (wait == Wait::Event).then(|| Listener::open(settings)).transpose()?,
         })
+    }
+
+    /// Does of sending what can be done before the pose is there.
+    fn prepare(&mut self) {
+        if self.next.is_none() {
+            self.next = self.writer.loan().ok();
+        }
+        if let Some(next) = &mut self.next {
+            next.touch();
+        }
+    }
+
+    fn send(&mut self, pose: &CorrectedPose) -> Result<usize, TransportError> {
+        match self.next.take() {
+            Some(next) => next.send(pose),
+            None => self.writer.send(pose),
+        }
     }
 }
 
@@ -245,6 +265,7 @@ impl<E: Estimator> Runner<E> {
                 Waited::Polled
             }
             Wait::Event => {
+                self.prepare();
                 let deadline = (now + period + period / 4).min(stale);
                 let mut left = deadline - now;
                 while left > 0 && !self.waiting_state() && !self.shared.stop.load(Relaxed) {
@@ -282,9 +303,16 @@ impl<E: Estimator> Runner<E> {
         }
     }
 
+    fn prepare(&mut self) {
+        if let Some(link) = &mut self.link {
+            link.prepare();
+        }
+    }
+
     fn poll_until(&mut self, deadline_ns: i64) {
         // Bounded by the deadline, which is at most one period away.
         while !self.waiting_state() && now_ns() < deadline_ns {
+            self.prepare();
             if self.waiting.keep_warm {
                 self.cycle.keep_warm();
             }
@@ -306,7 +334,7 @@ impl<E: Estimator> Runner<E> {
     }
 
     fn send(&mut self) {
-        if self.link.as_ref().is_none_or(|link| link.writer.send(&self.pose).is_err()) {
+        if self.link.as_mut().is_none_or(|link| link.send(&self.pose).is_err()) {
             self.link_counters.send_failures += 1;
         }
         self.shared.show_arms(&self.pose);

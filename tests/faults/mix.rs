@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 const VALID: u32 = ArmStatus::Valid as u32;
 /// What the reader's queue holds.
-const QUEUE: usize = 64;
+const QUEUE: usize = ravenpose_transport::DEPTH_MAX;
 
 /// Cycles in all; `RAVENPOSE_FAULT_CYCLES` asks for more.
 fn cycles() -> u64 {

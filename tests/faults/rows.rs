@@ -4,6 +4,7 @@ use crate::common::Rng;
 use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, model as model_of_world, state};
 use ravenpose::cycle::{ArmModel, Counters, Cycle, Limits};
 use ravenpose::guard::Guard;
+use ravenpose_transport::DEPTH_MAX;
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, features, flag};
 
 const VALID: u32 = ArmStatus::Valid as u32;
@@ -468,11 +469,11 @@ fn f25_the_wall_clock_has_no_effect_and_a_stop_is_stale_then_recovers() {
         // Compared as text, because a bound of NaN equals nothing.
         assert_eq!(format!("{expected:?}"), format!("{:?}", jumping.run(&[state]).expect("answered")));
     }
-    // Stopped for three seconds and continued: 64 states wait, the newest is fresh.
-    let waiting: Vec<RavenState> = (0..64).map(|_| jumping.next_state()).collect();
+    // Stopped for three seconds and continued: a full queue waits, its newest is fresh.
+    let waiting: Vec<RavenState> = (0..DEPTH_MAX).map(|_| jumping.next_state()).collect();
     let pose = jumping.run(&waiting).expect("answered");
-    assert_eq!(pose.source_sequence, waiting[63].sequence);
-    assert_eq!(pose.skipped, 63);
+    assert_eq!(pose.source_sequence, waiting[DEPTH_MAX - 1].sequence);
+    assert_eq!(pose.skipped, DEPTH_MAX as u64 - 1);
     assert_eq!(jumping.cycle.counters().published, 501, "one answer, not a burst");
 }
 

@@ -200,6 +200,12 @@ pub struct Loan<T: Message> {
 }
 
 impl<T: Message> Loan<T> {
+    /// Brings the memory of the message to this core: readers had it last, and each line that comes from another core costs a tenth of a
+    /// microsecond while it is written.
+    pub fn touch(&mut self) {
+        *self.sample.payload_mut() = MaybeUninit::zeroed();
+    }
+
     /// Where the message will lie; uninitialised.
     pub fn as_mut_ptr(&mut self) -> *mut T {
         self.sample.payload_mut().as_mut_ptr()
