@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use arm::Side;
+use recordings::cut::{CutSource, CutTable, Stretch};
 use recordings::open::{Opened, open};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
@@ -17,7 +18,17 @@ const PARTLY: u8 = 1;
 
 const OUTPUTS: &str = ".mcap, .bag, .rvs, .txt (235 columns), .252.csv, .csv, .csv.gz or .parquet";
 
-pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>) -> Result<ExitCode, String> {
+/// What `--from` and `--to` ask for.
+pub(crate) fn stretch(from: Option<f64>, to: Option<f64>) -> Result<Stretch, String> {
+    let stretch = Stretch { from_s: from.unwrap_or(Stretch::ALL.from_s), to_s: to.unwrap_or(Stretch::ALL.to_s) };
+    // Written so that NaN fails.
+    if stretch.from_s >= 0.0 && stretch.to_s > stretch.from_s {
+        return Ok(stretch);
+    }
+    Err(format!("--from {} --to {}: must be seconds after the first record, the second one larger", stretch.from_s, stretch.to_s))
+}
+
+pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>, stretch: Stretch) -> Result<ExitCode, String> {
     if same_file(input, out) {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
@@ -25,11 +36,14 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>) -> Result<ExitCod
     let tables = TableFormat::of_name(out);
     let arms = arm.map(arms_of);
     let damage = match (open(input).map_err(|error| error.to_string())?, states, tables) {
-        (Opened::States(source), Some(format), _) => states_to_states(input, source, out, format)?,
-        (Opened::States(source), None, Some(format)) => states_to_table(source, out, format, arms)?,
-        (Opened::Table(source), _, Some(format)) => table_to_table(source, out, format)?,
+        (Opened::States(source), Some(format), _) => states_to_states(input, cut(source, stretch), out, format)?,
+        (Opened::States(source), None, Some(format)) => {
+            let table = states_as_table(cut(source, stretch), format, arms)?;
+            table_to_table(input, table, out, format)?
+        }
+        (Opened::Table(source), _, Some(format)) => table_to_table(input, cut_table(input, source, stretch)?, out, format)?,
         (Opened::Table(_), Some(format), None) => {
-            table_to_states(input, out, format, arms.unwrap_or(Arms::Gold))?;
+            table_to_states(input, out, format, arms.unwrap_or(Arms::Gold), stretch)?;
             None
         }
         (_, None, None) => return Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
@@ -42,6 +56,20 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>) -> Result<ExitCod
         damage.what
     );
     Ok(ExitCode::from(PARTLY))
+}
+
+fn cut(source: Box<dyn Source>, stretch: Stretch) -> Box<dyn Source> {
+    if stretch == Stretch::ALL { source } else { Box::new(CutSource::new(source, stretch)) }
+}
+
+fn cut_table(input: &Path, source: Box<dyn TableSource>, stretch: Stretch) -> Result<Box<dyn TableSource>, String> {
+    if stretch == Stretch::ALL {
+        return Ok(source);
+    }
+    match CutTable::new(source, stretch) {
+        Some(cut) => Ok(Box::new(cut)),
+        None => Err(format!("{}: has no column t_s, which --from and --to need", input.display())),
+    }
 }
 
 fn arms_of(name: &str) -> Arms {
@@ -71,8 +99,10 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
     progress.end();
     let records = records.map_err(|error| error.to_string())?;
     if records == 0 {
-        let why =
-            source.damage().map_or_else(|| "it holds no state".to_owned(), |damage| format!("{}: {}", damage.place, damage.what));
+        let why = source.damage().map_or_else(
+            || "it holds no state, or none of that time".to_owned(),
+            |damage| format!("{}: {}", damage.place, damage.what),
+        );
         return Err(format!("{}: {why}; nothing was written", input.display()));
     }
     sink.finish().map_err(|error| error.to_string())?;
@@ -88,13 +118,18 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
     Ok(source.damage().cloned())
 }
 
-fn states_to_table(source: Box<dyn Source>, out: &Path, format: TableFormat, arms: Option<Arms>) -> Result<Option<Damage>, String> {
+fn states_as_table(source: Box<dyn Source>, format: TableFormat, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
     note_all(format.losses_of_states());
     let table = StateTable::new(source, tidy::Options { arms, all_truth: false }).map_err(|error| error.to_string())?;
-    table_to_table(Box::new(table), out, format)
+    Ok(Box::new(table))
 }
 
-fn table_to_table(mut source: Box<dyn TableSource>, out: &Path, format: TableFormat) -> Result<Option<Damage>, String> {
+fn table_to_table(
+    input: &Path,
+    mut source: Box<dyn TableSource>,
+    out: &Path,
+    format: TableFormat,
+) -> Result<Option<Damage>, String> {
     let metadata = source.metadata().to_vec();
     let columns = source.columns().to_vec();
     let mut sink = save::create_table(out, format, &columns, &metadata).map_err(|error| error.to_string())?;
@@ -102,13 +137,16 @@ fn table_to_table(mut source: Box<dyn TableSource>, out: &Path, format: TableFor
     let rows = table::copy(source.as_mut(), sink.as_mut(), &mut |done, total| progress.at(done, total));
     progress.end();
     let rows = rows.map_err(|error| error.to_string())?;
+    if rows == 0 {
+        return Err(format!("{}: it holds no row, or none of that time; nothing was written", input.display()));
+    }
     sink.finish().map_err(|error| error.to_string())?;
     say!("{}: {rows} rows, {} columns", out.display(), columns.len());
     Ok(source.damage().cloned())
 }
 
 /// Full states need a time that rises, joints or motors: the strict reader refuses what lacks them.
-fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) -> Result<(), String> {
+fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, stretch: Stretch) -> Result<(), String> {
     let recording = strict(input)?;
     let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
     for note in &made.notes {
@@ -119,16 +157,25 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms) ->
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
     let keeps_truth = format != StateFormat::StateFile && format != StateFormat::Columns235;
     let side = if arms == Arms::Green { Side::Green } else { Side::Gold };
+    let mut first_ns = None;
+    let mut written = 0_usize;
     for (row, state) in made.states.iter().enumerate() {
         let record = Record::State(Box::new(*state));
         let time_ns = record.time_ns();
+        if !stretch.holds((time_ns - *first_ns.get_or_insert(time_ns)) as f64 * 1e-9) {
+            continue;
+        }
+        written += 1;
         sink.write(&record).map_err(|error| error.to_string())?;
         if let Some(truth) = truth(&recording, row, time_ns, side).filter(|_| keeps_truth) {
             sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
         }
     }
+    if written == 0 {
+        return Err(format!("{}: it holds no row of that time; nothing was written", input.display()));
+    }
     sink.finish().map_err(|error| error.to_string())?;
-    say!("{}: {} states, {:.3} s", out.display(), made.states.len(), made.states.len() as f64 * 1e-3);
+    say!("{}: {written} states, {:.3} s", out.display(), written as f64 * 1e-3);
     Ok(())
 }
 

@@ -64,6 +64,12 @@ enum Command {
         /// Arm that a table belongs to, or arms of states that a table shall show
         #[arg(long, value_parser = ["gold", "green", "both"])]
         arm: Option<String>,
+        /// Leave out what comes before so many seconds of it
+        #[arg(long, value_name = "S")]
+        from: Option<f64>,
+        /// Leave out what comes after so many seconds of it
+        #[arg(long, value_name = "S")]
+        to: Option<f64>,
     },
     /// What is in a recording: channels, rates, gaps, duplicates, saturation, standstill, damage
     Info {
@@ -237,7 +243,9 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Infer { model, input, out, weights, in_order } => infer::run(&model, &input, &out, &weights, in_order),
-        Command::Convert { input, out, arm } => convert::run(&input, &out, arm.as_deref()),
+        Command::Convert { input, out, arm, from, to } => {
+            convert::stretch(from, to).and_then(|stretch| convert::run(&input, &out, arm.as_deref(), stretch))
+        }
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
         Command::Pair { run, truth, out, cameras, register, same, offset_s } => pair::run(&pair::Wish {

@@ -69,6 +69,54 @@ fn a_simulated_run_has_every_state_and_its_truth_and_converts_to_everything() {
 }
 
 #[test]
+fn a_stretch_is_cut_out_of_states_and_tables_alike() {
+    let folder = Folder::new("cut");
+    let out = folder.file("runs");
+    assert!(simulate(&out, &[]).status.success());
+    let run = out.join("run_0001.mcap");
+    let whole = folder.file("whole.csv");
+    done(&["convert", text(&run), text(&whole)]);
+    let rows = |path: &Path| -> Vec<String> {
+        let lines = std::fs::read_to_string(path).expect("table");
+        lines.lines().filter(|line| !line.starts_with('#')).skip(1).map(str::to_owned).collect()
+    };
+    // The same second out of the states, out of the table, and out of the table as states.
+    let cut = ["--from", "1", "--to", "2"];
+    let (states, table, back) = (folder.file("states.mcap"), folder.file("table.csv"), folder.file("back.rvs"));
+    done(&[&["convert", text(&run), text(&states)], &cut[..]].concat());
+    done(&[&["convert", text(&whole), text(&table)], &cut[..]].concat());
+    assert_eq!(rows(&table), rows(&whole)[1000..2000]);
+    let of_states = folder.file("of_states.csv");
+    done(&["convert", text(&states), text(&of_states)]);
+    // Each table begins at zero on its own; everything else is the same.
+    let but_time =
+        |rows: Vec<String>| -> Vec<String> { rows.iter().map(|row| row.split_once(',').expect("columns").1.to_owned()).collect() };
+    assert_eq!(but_time(rows(&of_states)), but_time(rows(&table)));
+    let said = ravenpose(&[&["convert", text(&whole), text(&back)], &cut[..]].concat());
+    assert!(String::from_utf8_lossy(&said.stdout).contains("1000 states, 1.000 s"), "{said:?}");
+    // The end alone, and the begin alone.
+    done(&["convert", text(&whole), text(&table), "--from", "2.5"]);
+    assert_eq!(rows(&table), rows(&whole)[2500..]);
+    done(&["convert", text(&whole), text(&table), "--to", "0.25"]);
+    assert_eq!(rows(&table), rows(&whole)[..250]);
+
+    let nothing = folder.file("nothing.mcap");
+    for (input, cut, why) in [
+        (&run, ["--from", "9", "--to", "10"], "none of that time; nothing was written"),
+        (&whole, ["--from", "9", "--to", "10"], "no row of that time; nothing was written"),
+        (&run, ["--from", "2", "--to", "1"], "--from 2 --to 1: must be seconds"),
+        (&run, ["--from", "NaN", "--to", "1"], "must be seconds"),
+    ] {
+        refused(&ravenpose(&[&["convert", text(input), text(&nothing)], &cut[..]].concat()), &[why]);
+        assert!(!nothing.exists());
+    }
+    let timeless = folder.file("timeless.csv");
+    std::fs::write(&timeless, "x_mm\n1\n2\n").expect("table");
+    let output = ravenpose(&["convert", text(&timeless), text(&table), "--to", "1"]);
+    refused(&output, &["has no column t_s, which --from and --to need"]);
+}
+
+#[test]
 fn pairs_of_a_simulated_run_are_its_error() {
     let folder = Folder::new("pairs");
     let out = folder.file("runs");

@@ -9,6 +9,7 @@
 pub mod columns235;
 pub mod columns252;
 pub mod csv;
+pub mod cut;
 pub mod describe;
 pub mod open;
 pub mod pairs;
