@@ -2,7 +2,8 @@
 
 Times the simulator in its process (times real time, step, accuracy), then `ravenpose simulate` and conversions as a user runs them:
 seconds, times real time, MB/s of input, peak resident memory. Tracking of four cameras stage by stage. `ravenpose gap` on
-runs of rising length; `--only gap` does that alone. `--out FILE` keeps what was printed.
+runs of rising length; `--only gap` does that alone; `--only growth` takes runs of 1 minute to 10 hours through simulator and converters (26 GB of
+disk, half an hour). `--out FILE` keeps what was printed.
 """
 import argparse
 import os
@@ -97,10 +98,27 @@ def recordings(folder, minutes):
     say(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
 
 
+def growth(folder, lengths):
+    """One run of each length, written, looked through and converted: what grows, and what must not."""
+    for minutes in lengths:
+        place = folder / f"growth-{minutes:g}"
+        written = run([BIN / "ravenpose", "simulate", "--minutes", str(minutes), "--run-minutes", str(minutes), "--seed", "1",
+                       "--robot", "raven2-worn", "--out", place])
+        source = place / "run_0001.mcap"
+        size = source.stat().st_size / 1e6
+        looked = run([BIN / "ravenpose", "info", source])
+        converted = run([BIN / "ravenpose", "convert", source, place / "run.parquet"])
+        cut = run([BIN / "ravenpose", "convert", source, place / "cut.mcap", "--from", str(minutes * 30), "--to", str(minutes * 30 + 30)])
+        parts = ", ".join(f"{name} {seconds:.1f} s and {memory:.0f} MiB" for name, (seconds, memory) in
+                          [("simulate", written), ("info", looked), ("to Parquet", converted), ("30 s cut out", cut)])
+        say(f"one run of {minutes:g} min, {size:.0f} MB: {parts}")
+        shutil.rmtree(place)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--minutes", type=float, default=140.0)
-    parser.add_argument("--only", choices=["gap"])
+    parser.add_argument("--only", choices=["gap", "growth"])
     parser.add_argument("--out", type=pathlib.Path)
     options = parser.parse_args()
     if options.out:
@@ -113,7 +131,10 @@ def main():
         told(BIN / "examples/stages")
     folder = pathlib.Path(tempfile.mkdtemp(prefix="ravenpose-bench."))
     try:
-        gap(folder)
+        if options.only == "growth":
+            growth(folder, [1, 10, 100, 600])
+        else:
+            gap(folder)
         if options.only is None:
             recordings(folder, options.minutes)
     finally:

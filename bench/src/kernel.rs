@@ -106,7 +106,8 @@ impl Engine {
     }
 }
 
-fn flush(from: *const u8, length: usize) {
+/// Puts memory out of every cache.
+pub(crate) fn flush(from: *const u8, length: usize) {
     #[cfg(target_arch = "x86_64")]
     for offset in (0..length).step_by(64) {
         // SAFETY: an address inside memory that the caller borrows; flushing changes no value.

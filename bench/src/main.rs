@@ -4,6 +4,7 @@
 
 mod growth;
 mod kernel;
+mod memory;
 mod onnxruntime;
 mod openvino;
 mod page;
@@ -36,24 +37,28 @@ struct Parts {
     /// Of the kernel only the tight loop.
     tight_only: bool,
     growth: bool,
+    memory: bool,
     means: bool,
     waits: Vec<&'static str>,
 }
 
 impl Parts {
-    /// All of `ci` or `full`, or what `RAVENPOSE_BENCH_ONLY` names: `tight` or `kernel` for the network alone; `sleep`, `spin` or
+    /// All of `ci` or `full`, or what `RAVENPOSE_BENCH_ONLY` names: `tight` or `kernel` for the network alone; `memory` for what caches and pages bring; `sleep`, `spin` or
     /// `event` for one way of waiting; `means` for what makes the default one fast.
     fn wanted(full: bool, only: Option<&str>) -> Result<Self, String> {
         const WAITS: [&str; 3] = ["sleep", "spin", "event"];
-        let nothing = Self { kernel: false, tight_only: false, growth: false, means: false, waits: Vec::new() };
+        let nothing = Self { kernel: false, tight_only: false, growth: false, memory: false, means: false, waits: Vec::new() };
         Ok(match only {
-            None => Self { kernel: true, growth: true, means: full, waits: WAITS.to_vec(), ..nothing },
+            None => Self { kernel: true, growth: true, memory: full, means: full, waits: WAITS.to_vec(), ..nothing },
             Some("tight") => Self { kernel: true, tight_only: true, ..nothing },
             Some("kernel") => Self { kernel: true, ..nothing },
+            Some("memory") => Self { memory: true, ..nothing },
             Some("means") => Self { means: true, ..nothing },
             Some(other) => match WAITS.into_iter().find(|wait| *wait == other) {
                 Some(wait) => Self { waits: vec![wait], ..nothing },
-                None => return Err(format!("RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, means, sleep, spin or event")),
+                None => {
+                    return Err(format!("RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, memory, means, sleep, spin or event"));
+                }
             },
         })
     }
@@ -68,6 +73,11 @@ fn main() -> ExitCode {
         ["full", "--write"] => (true, true),
         ["soak"] => return ended(soak("30")),
         ["soak", minutes] => return ended(soak(minutes)),
+        // What this program asks of itself, on the core where it then is.
+        ["asleep"] => {
+            println!("{}", memory::asleep());
+            return ExitCode::SUCCESS;
+        }
         _ => {
             eprintln!("usage: ravenpose-bench ci|full [--write]|soak [MINUTES] (from the repository's top)");
             return ExitCode::from(2);
@@ -120,6 +130,11 @@ fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
     if parts.kernel {
         tables = network(parts, service_core, runs)?;
     }
+    if parts.memory {
+        let table = on_core(service_core, || memory::run(service_core))?;
+        println!("{table}");
+        tables.push(table);
+    }
     if parts.means || !parts.waits.is_empty() {
         become_the_robot();
     }
@@ -147,19 +162,12 @@ fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
 fn network(parts: &Parts, core: usize, runs: usize) -> Result<Vec<Table>, String> {
     let model = "models/untrained.onnx";
     let bytes = std::fs::read(model).map_err(|cause| format!("{model}: {cause}; run from the repository's top"))?;
-    // Without FIFO here: a thread that computes without a pause would meet real-time throttling.
-    let tables = std::thread::scope(|scope| {
-        scope
-            .spawn(|| {
-                let _ = realtime::pin(core);
-                let mut tables = kernel::run(&bytes, Path::new(model), runs, parts.tight_only)?;
-                if parts.growth {
-                    tables.extend(growth::run());
-                }
-                Ok::<_, String>(tables)
-            })
-            .join()
-            .map_err(|_| "the kernel benchmark failed".to_owned())?
+    let tables = on_core(core, || {
+        let mut tables = kernel::run(&bytes, Path::new(model), runs, parts.tight_only)?;
+        if parts.growth {
+            tables.extend(growth::run());
+        }
+        Ok(tables)
     })?;
     for table in &tables {
         println!("{table}");
@@ -169,6 +177,15 @@ fn network(parts: &Parts, core: usize, runs: usize) -> Result<Vec<Table>, String
         return Err(format!("float32 takes {gate:.2} times tract's time in the same process, more than {RATIO_TO_TRACT_MAX}"));
     }
     Ok(tables)
+}
+
+/// In a thread on this core; without FIFO: one that computes without a pause would meet real-time throttling.
+fn on_core<T: Send>(core: usize, work: impl FnOnce() -> Result<T, String> + Send) -> Result<T, String> {
+    let pinned = || {
+        let _ = realtime::pin(core);
+        work()
+    };
+    std::thread::scope(|scope| scope.spawn(pinned).join().map_err(|_| "a part of the benchmark failed".to_owned())?)
 }
 
 /// A wake-up baseline of the same minute, then each way of waiting.

@@ -10,8 +10,8 @@ const PAGE: &str = "# Performance
 
 Written by `make bench`: every table by one run of `ravenpose-bench full --write`, the offline tools by `bench/offline.py`
 just before it, Keras by `bench/keras_predict.py` when its lines say. Such machines are shared and noisy:
-compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `sleep`, `spin`,
-`event`, `means`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
+compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `memory`,
+`sleep`, `spin`, `event`, `means`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
 
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
