@@ -18,6 +18,8 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
 - *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
+- *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last three
+  rows are processes of their own, one after the other: compare them with one another.
 - *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
 - The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth
   counts; beyond, the next one's.
