@@ -1,6 +1,7 @@
 //! `ravenpose gap`: where simulation and recordings differ, and which physics is missing.
 
 mod live;
+mod memory;
 
 use crate::output;
 use ::gap::analysis::{Given, Options, Outcome, analyse};
@@ -76,6 +77,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         trace: wish.trace,
         config_sha256: sha256(format!("{text}{thresholds:?}{}", wish.seed).as_bytes()),
         urdf_sha256: urdf.map(|path| hash(Path::new(path))).transpose()?,
+        free_bytes: memory::free_bytes,
     };
     if wish.watch && wish.real.is_empty() {
         return live::watch(&model, &options, wish);

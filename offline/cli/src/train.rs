@@ -3,7 +3,7 @@
 use crate::output;
 use ::training::commands::{self, Done, Event};
 use ::training::data::{Columns, Reading};
-use ::training::preset::Recipe;
+use ::training::preset::{First, Recipe};
 use arm::Side;
 use clap::Args;
 use std::io::IsTerminal;
@@ -24,9 +24,12 @@ pub(crate) struct Wish {
     /// Recipe in a file: best.json of `ravenpose search`
     #[arg(long, conflicts_with = "preset", value_name = "FILE")]
     recipe: Option<PathBuf>,
-    /// Everything random: split, weights, order of rows
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
+    /// What is fitted before the network, which learns the rest; default: either for tables, nothing for states
+    #[arg(long, value_parser = First::NAMES)]
+    first: Option<String>,
+    /// Everything random: split, weights, order of rows; default: the recipe file's, else 0
+    #[arg(long)]
+    seed: Option<u64>,
     /// Passes over the training rows, instead of the preset's
     #[arg(long)]
     epochs: Option<usize>,
@@ -115,13 +118,21 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         None => preset(&wish.preset)?,
         Some(file) => recipe(file)?,
     };
-    recipe.seed = wish.seed;
-    if let Some(epochs) = wish.epochs {
-        recipe.epochs = epochs;
-    }
+    // The trajectories that a search chose by must not become test trajectories.
+    recipe.seed = wish.seed.unwrap_or(recipe.seed);
     if wish.source.is_table() {
         recipe = recipe.for_tables();
     }
+    if let Some(epochs) = wish.epochs {
+        recipe.epochs = epochs;
+    }
+    if let Some(first) = wish.first.as_deref().and_then(First::of_name) {
+        recipe.first = first;
+    }
+    recipe.check().map_err(|wrong| match &wish.recipe {
+        Some(file) => format!("{}: {wrong}; give the best.json of `ravenpose search`", file.display()),
+        None => format!("--preset {}: {wrong}", wish.preset),
+    })?;
     let reading = wish.source.reading(&recipe)?;
     let wanted = commands::Wish { data: &wish.source.data, reading: &reading, recipe: &recipe, out: &wish.out };
     let terminal = std::io::stderr().is_terminal();
@@ -146,9 +157,6 @@ fn recipe(file: &Path) -> Result<Recipe, String> {
         .map_err(|cause| format!("{name}: cannot be read: {cause}; give the best.json of `ravenpose search`"))?;
     let recipe: Recipe = serde_json::from_str(&text)
         .map_err(|error| format!("{name}: line {}: {error}; give the best.json of `ravenpose search`", error.line()))?;
-    if recipe.hidden.is_empty() || recipe.hidden.contains(&0) || recipe.batch == 0 || recipe.rate.is_nan() || recipe.rate <= 0.0 {
-        return Err(format!("{name}: hidden, batch and rate must be above 0"));
-    }
     Ok(recipe)
 }
 
@@ -177,7 +185,7 @@ fn words(wish: &Wish, done: &Done) -> String {
     let bounds: Vec<String> = done.bounds.iter().map(|bound| format!("{bound:.3}")).collect();
     format!(
         "{}: {} numbers learnt from {} rows of {train} trajectories in {:.0} s\n\
-         validation ({validation} trajectories): {:.3} {} RMS left in epoch {}; 95 % bound per axis {}\n\
+         validation ({validation} trajectories): {:.3} {} RMS left in epoch {}{}; 95 % bound per axis {}\n\
          test ({test} trajectories, {} rows): not read; `ravenpose evaluate` with the same --data does\n",
         wish.out.display(),
         done.weights,
@@ -186,6 +194,7 @@ fn words(wish: &Wish, done: &Done) -> String {
         done.validation_rms,
         done.unit,
         done.epoch,
+        if done.has_line { ", after a line" } else { "" },
         bounds.join(" "),
         done.rows[2]
     )

@@ -47,12 +47,21 @@ pub struct Options {
     pub trace: bool,
     /// SHA-256 of the URDF, if the robot came as one.
     pub urdf_sha256: Option<String>,
+    /// Bytes of memory that are free at the moment; none where nobody knows.
+    pub free_bytes: fn() -> Option<u64>,
 }
 
 impl Default for Options {
     /// The usual limits, and a hash of nothing.
     fn default() -> Self {
-        Self { thresholds: Thresholds::default(), seed: 0, config_sha256: "0".repeat(64), trace: false, urdf_sha256: None }
+        Self {
+            thresholds: Thresholds::default(),
+            seed: 0,
+            config_sha256: "0".repeat(64),
+            trace: false,
+            urdf_sha256: None,
+            free_bytes: || None,
+        }
     }
 }
 
@@ -69,6 +78,19 @@ pub enum AnalysisError {
     NoChannel {
         /// The first run.
         run: String,
+    },
+    /// The library of explanations does not fit.
+    #[error(
+        "{minutes:.0} minutes to explain need some {needs_gib:.1} GiB of memory, {free_gib:.1} are free; take stretches of a few minutes \
+         with `ravenpose convert --from S --to S`, of a simulation the same ones, and give each of them as a run"
+    )]
+    Memory {
+        /// Length of what is fitted on.
+        minutes: f64,
+        /// What it needs.
+        needs_gib: f64,
+        /// What there is.
+        free_gib: f64,
     },
 }
 
@@ -123,6 +145,8 @@ pub struct Found<'a> {
 const SHORTEST_S: f64 = 6.0;
 /// Fewest rows of a run.
 const LEAST_ROWS: usize = 20;
+/// Of what follows the smoothing at its peak, per row of the fit and joint, a tenth to spare (`examples/resources.rs`, 20 minutes).
+const LIBRARY_BYTES: f64 = 24_000.0;
 /// Share of a single run that is held out.
 const HELD_OUT: f64 = 1.0 / 3.0;
 /// Length of a block, s; long runs take longer ones.
@@ -279,6 +303,7 @@ fn analyse_with(
         quality.insert(0, too_few(seen_s));
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
+    fits(&train, robot.joint_count(), options.free_bytes)?;
     progress("learning what the simulator believes");
     let apart: Vec<Motion> = apart.into_iter().map(|sim| Motion::new(sim, band)).collect();
     let sims: Vec<&Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.as_ref()).chain(&apart).collect();
@@ -419,6 +444,20 @@ fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceil
     let Some((c, _)) = ceiling.cell else { return true };
     let within = answer.fit.within[c] / problem.cells[c].rows.len().max(1) as f64;
     !problem.from_recording || within.sqrt() > problem.practical.any[c]
+}
+
+/// Refuses what the library of explanations would fill more memory for than there is.
+fn fits(train: &[Pair], joints: usize, free_bytes: fn() -> Option<u64>) -> Result<(), AnalysisError> {
+    let rows: usize = train.iter().map(|pair| pair.real.rows.len().max(pair.real.tip_rows.len())).sum();
+    let needs = LIBRARY_BYTES * (rows * joints) as f64;
+    let gib = |bytes: f64| bytes / f64::from(1 << 30);
+    match free_bytes() {
+        Some(free) if needs > free as f64 => {
+            let seconds: f64 = train.iter().map(|pair| pair.real.run.len() as f64 * pair.real.run.dt_s).sum();
+            Err(AnalysisError::Memory { minutes: seconds / 60.0, needs_gib: gib(needs), free_gib: gib(free as f64) })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn too_short(seconds: f64) -> DataQuality {

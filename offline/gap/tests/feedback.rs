@@ -3,7 +3,6 @@
 #![allow(missing_docs)]
 
 use gap::analysis::{Given, Options, Outcome, analyse};
-use gap::search::Thresholds;
 use gap_report::{Report, Role, Space, Status};
 use recordings::{Column, Recording};
 use simulator::Random;
@@ -79,7 +78,7 @@ fn gap(model: &RobotModel, real: &[Recording]) -> Outcome {
         .iter()
         .map(|run| Given { id: run.name.clone(), real: run.clone(), real_sha256: sha.clone(), notes: Vec::new(), sim: None })
         .collect();
-    let options = Options { thresholds: Thresholds::default(), seed: 0, config_sha256: sha, trace: false, urdf_sha256: None };
+    let options = Options { config_sha256: sha, ..Options::default() };
     let outcome = analyse(model, &given, &options, &mut |_| {}).expect("a report");
     println!("{}", gap_report::words(&outcome.report));
     outcome
@@ -170,4 +169,14 @@ fn a_wrong_zero_is_fed_back() {
 #[test]
 fn a_wrong_coupling_is_fed_back() {
     found_out("joint_coupling", "c_ij", &fed_back("joint_coupling", Bound::Pair(1, 0), &[("c_ij", 0.08)]));
+}
+
+#[test]
+fn what_does_not_fit_the_memory_is_refused_with_the_way_out() {
+    let run = recorded(&nominal(), 1);
+    let given = [Given { id: "run".to_owned(), real: run, real_sha256: "0".repeat(64), notes: Vec::new(), sim: None }];
+    let with = |free_bytes| analyse(&nominal(), &given, &Options { free_bytes, ..Options::default() }, &mut |_| {});
+    let line = with(|| Some(1 << 20)).expect_err("a mebibyte").to_string();
+    assert!(line.contains("GiB of memory, 0.0 are free") && line.contains("ravenpose convert --from S --to S"), "{line}");
+    assert!(with(|| Some(1 << 34)).is_ok());
 }

@@ -175,6 +175,7 @@ mod tests {
                     label_scale: 3.0,
                     curves: Vec::new(),
                     seconds: 0.0,
+                    has_line: false,
                 };
                 let chain = Chain::of(&trained, &[]);
                 for (a, b) in trained.estimate(&one.inputs).iter().zip(chain.estimate(&one.inputs)) {

@@ -50,6 +50,8 @@ pub struct Done {
     pub validation_rms: f64,
     /// In which epoch.
     pub epoch: usize,
+    /// Is there a line that the network learnt the rest of?
+    pub has_line: bool,
     /// Half widths of 95 %.
     pub bounds: Vec<f64>,
     /// Wall time of learning, s.
@@ -67,6 +69,7 @@ pub struct Done {
 /// # Errors
 /// [`TrainingError`]: data, checkpoint, or files that cannot be written.
 pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
+    check_out(wish.out, wish.data)?;
     let (mut set, mut parts) =
         read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
     let count = |part: &[Trajectory]| part.iter().map(Trajectory::rows).sum();
@@ -77,8 +80,7 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
     let trained = train::train(&parts.train, &parts.validation, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
     let chain = Chain::of(&trained, &wish.reading.plays);
-    let best = trained.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
-    let (epoch, validation_rms) = best.map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
+    let (epoch, validation_rms) = trained.best().map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
     let mut notes = std::mem::take(&mut set.notes);
     let load = if set.is_raven {
         let arm = Raven2::nominal().arm(wish.reading.arm);
@@ -109,12 +111,29 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
         trajectories,
         validation_rms,
         epoch,
+        has_line: trained.has_line,
         bounds: card::bounds(&chain, &parts.validation, wish.reading.truth_noise_mm),
         seconds: trained.seconds,
         weights: chain.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum(),
         notes,
         unit,
     })
+}
+
+/// Can a file be written there in the end, and is it none of those that are read?
+fn check_out(out: &Path, data: &[PathBuf]) -> Result<(), TrainingError> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let same = |file: &PathBuf| out.canonicalize().is_ok_and(|out| file.canonicalize().is_ok_and(|file| file == out));
+    let what = if out.is_dir() {
+        "is a folder"
+    } else if !folder.is_dir() {
+        "lies in no folder"
+    } else if data.iter().any(same) {
+        "is one of the recordings"
+    } else {
+        return Ok(());
+    };
+    Err(TrainingError::file(out, what, "choose another --out"))
 }
 
 /// Reads recordings and deals whole trajectories out; what they have in common stays behind.
@@ -134,15 +153,15 @@ pub(crate) fn read_parts(
     Ok((set, parts))
 }
 
-/// The same run given twice would be in two sets.
+/// A run that is given twice, whole or in part, would be in two sets.
 fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
-    let mut seen = BTreeMap::new();
-    for one in &set.trajectories {
-        if let Some(other) = seen.insert(one.id(), &one.name) {
+    for (k, one) in set.trajectories.iter().enumerate() {
+        let before = &set.trajectories[..k];
+        if let Some(other) = before.iter().find(|other| other.id() == one.id() || other.sketch.overlaps(&one.sketch)) {
             return Err(TrainingError::Unfit {
                 file: one.name.clone(),
-                what: format!("begins exactly as {other} does: the same run twice"),
-                remedy: "give each run once, or it would be in training and test at a time",
+                what: format!("holds rows of {}: the same run twice", other.name),
+                remedy: "give each stretch of a run once, or it would be in training and test at a time",
             });
         }
     }
@@ -158,18 +177,20 @@ fn beside(model: &Path, extension: &str) -> PathBuf {
 }
 
 fn trained_on(wish: &Wish, rows: [usize; 3], trajectories: [usize; 3], set: &DataSet) -> String {
-    let minutes: f64 = rows.iter().sum::<usize>() as f64 / wish.reading.truth_hz / 60.0;
+    let minutes = |rows: usize| rows as f64 / wish.reading.truth_hz / 60.0;
     let kind = if set.is_raven { "RAVEN-II recordings" } else { "tables" };
     format!(
-        "{} {kind}, {} rows ({minutes:.1} minutes at {} Hz); truth noise {} mm added; whole trajectories split {}/{}/{} \
-         (training/validation/test); preset {}, seed {}",
+        "{} {kind}, {:.1} minutes of truth at {} Hz, whole trajectories split {}/{}/{} (training/validation/test); learnt from {} rows \
+         ({:.1} minutes); truth noise {} mm added; preset {}, seed {}",
         trajectories.iter().sum::<usize>(),
-        rows.iter().sum::<usize>(),
+        minutes(rows.iter().sum()),
         wish.reading.truth_hz,
-        wish.reading.truth_noise_mm,
         trajectories[0],
         trajectories[1],
         trajectories[2],
+        rows[0],
+        minutes(rows[0]),
+        wish.reading.truth_noise_mm,
         wish.recipe.name,
         wish.recipe.seed
     )
@@ -178,10 +199,13 @@ fn trained_on(wish: &Wish, rows: [usize; 3], trajectories: [usize; 3], set: &Dat
 /// Which runs took part in what, and how they were read: for `evaluate`.
 fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
     let ids = |set: &[Trajectory]| set.iter().map(Trajectory::id).collect::<Vec<_>>().join(" ");
+    let sketches = |set: &[Trajectory]| set.iter().map(|one| one.sketch.word()).collect::<Vec<_>>().join(" ");
     let recipe = serde_json::to_string(wish.recipe).unwrap_or_default();
     let mut more = BTreeMap::from([
         ("ravenpose.train_runs".to_owned(), ids(&parts.train)),
         ("ravenpose.validation_runs".to_owned(), ids(&parts.validation)),
+        ("ravenpose.train_sketches".to_owned(), sketches(&parts.train)),
+        ("ravenpose.validation_sketches".to_owned(), sketches(&parts.validation)),
         ("ravenpose.truth_hz".to_owned(), wish.reading.truth_hz.to_string()),
         ("ravenpose.truth_noise_mm".to_owned(), wish.reading.truth_noise_mm.to_string()),
         ("ravenpose.recipe".to_owned(), recipe),

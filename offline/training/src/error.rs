@@ -38,7 +38,10 @@ pub enum TrainingError {
         remedy: &'static str,
     },
     /// Too few trajectories for three sets.
-    #[error("{found} trajectories: at least 3 are needed, whole ones for training, validation and test; record more runs")]
+    #[error(
+        "{found} trajectories: at least 3 are needed, whole ones for training, validation and test; record more runs, or cut a long one up with \
+             `ravenpose convert --from S --to S`"
+    )]
     TooFew {
         /// How many there are.
         found: usize,

@@ -16,6 +16,38 @@ pub enum Schedule {
     Cosine,
 }
 
+/// What is fitted before the network, which then learns the rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum First {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// A line on all that the network sees; for tanh without normalisation.
+    Linear,
+    /// Either, each with a network of its own: what leaves less on validation.
+    Either,
+}
+
+impl First {
+    /// Names of all.
+    pub const NAMES: [&str; 3] = ["nothing", "linear", "either"];
+
+    /// One by its name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().position(|known| *known == name).map(|at| [Self::Nothing, Self::Linear, Self::Either][at])
+    }
+
+    /// Can a line pass the hidden layers?
+    pub fn passes(activation: Activation, norm: NormPlace) -> bool {
+        activation == Activation::Tanh && norm == NormPlace::None
+    }
+}
+
+/// Most hidden layers, and most units of one.
+const MOST_LAYERS: usize = 16;
+const MOST_UNITS: usize = 8192;
+
 /// Everything that training depends on but the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recipe {
@@ -29,6 +61,9 @@ pub struct Recipe {
     pub norm: NormPlace,
     /// What the network sees.
     pub preparation: Preparation,
+    /// What is fitted first.
+    #[serde(default)]
+    pub first: First,
     /// Does it want the memory of the recent motion?
     pub memory: bool,
     /// Rows per step.
@@ -73,6 +108,7 @@ impl Recipe {
             activation: Activation::Sigmoid,
             norm: NormPlace::Before,
             preparation: Preparation::Standard,
+            first: First::Nothing,
             memory: false,
             batch: 1024,
             rate: 1e-3,
@@ -96,17 +132,46 @@ impl Recipe {
         }
     }
 
+    /// Can it be trained?
+    ///
+    /// # Errors
+    /// What cannot be, in words.
+    pub fn check(&self) -> Result<(), String> {
+        let finite = |x: f64| x.is_finite() && x >= 0.0;
+        let wrong = if self.hidden.is_empty()
+            || self.hidden.len() > MOST_LAYERS
+            || !self.hidden.iter().all(|w| (1..=MOST_UNITS).contains(w))
+        {
+            format!("hidden must hold 1 to {MOST_LAYERS} widths of 1 to {MOST_UNITS}")
+        } else if self.batch == 0 || self.epochs == 0 || self.patience == 0 {
+            "batch, epochs and patience must be 1 or more".to_owned()
+        } else if !(finite(self.rate) && self.rate > 0.0 && finite(self.l1) && finite(self.decay)) {
+            "rate must be above 0, l1 and decay 0 or more".to_owned()
+        } else if self.activation == Activation::Identity {
+            "activation must not be identity: layers of it are one".to_owned()
+        } else if self.first != First::Nothing && !First::passes(self.activation, self.norm) {
+            "a line first wants activation tanh and norm none".to_owned()
+        } else {
+            return Ok(());
+        };
+        Err(wrong)
+    }
+
     /// The memory that it wants.
     pub fn plays(&self) -> Vec<Play> {
         if self.memory { memory::plays() } else { Vec::new() }
     }
 
     /// The same for tables, whose columns nobody knows: every one of them standardised. The default's network becomes one for
-    /// thousands of rows instead of hundreds of thousands.
+    /// thousands of rows instead of hundreds of thousands, which may learn what a line leaves.
     #[must_use]
     pub fn for_tables(self) -> Self {
         let ours = self.name == "default" || self.name == "one-state";
-        let small = if ours { Self { hidden: vec![48, 48], batch: 64, epochs: 80, decay: 0.1, ..self } } else { self };
+        let small = if ours {
+            Self { hidden: vec![48, 48], first: First::Either, batch: 64, epochs: 80, decay: 0.1, ..self }
+        } else {
+            self
+        };
         Self { preparation: Preparation::Standard, memory: false, ..small }
     }
 
@@ -118,6 +183,7 @@ impl Recipe {
             activation: Activation::Tanh,
             norm: NormPlace::None,
             preparation: Preparation::Physical,
+            first: First::Nothing,
             memory: true,
             batch: 256,
             rate: 2e-3,

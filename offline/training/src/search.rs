@@ -6,7 +6,7 @@ use crate::data::{Reading, Trajectory};
 use crate::error::{TrainingError, hex, shown};
 use crate::network::{Activation, NormPlace};
 use crate::prepare::Preparation;
-use crate::preset::{Recipe, Schedule};
+use crate::preset::{First, Recipe, Schedule};
 use crate::random::Random;
 use crate::split::Parts;
 use crate::train;
@@ -33,7 +33,7 @@ pub struct Wish<'a> {
     pub data: &'a [PathBuf],
     /// How they are read.
     pub reading: &'a Reading,
-    /// What is not searched: memory and seed; and the name and the epochs of the recipe that is written in the end.
+    /// What is not searched: memory, what is fitted first, and seed; and the name and the epochs of the recipe that is written in the end.
     pub base: &'a Recipe,
     /// Recipes of the first rung.
     pub trials: usize,
@@ -89,12 +89,16 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
     let (rate, decay, l1) = (log(3e-4, 1e-2), log(1e-2, 1.0), log(1e-7, 1e-5));
     let layers = 1 + random.below(4);
     let hidden = (0..layers).map(|_| 100 + 50 * random.below(11)).collect();
+    let activation = [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu][random.below(4)];
+    let norm = [NormPlace::None, NormPlace::Before, NormPlace::After][random.below(3)];
     Recipe {
         name: format!("search-{index}"),
         hidden,
-        activation: [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu][random.below(4)],
-        norm: [NormPlace::None, NormPlace::Before, NormPlace::After][random.below(3)],
-        preparation: [Preparation::Physical, Preparation::Standard][random.below(2)],
+        activation,
+        norm,
+        // A table has no physical quantities that anybody knew.
+        preparation: [base.preparation, Preparation::Standard][random.below(2)],
+        first: if First::passes(activation, norm) { base.first } else { First::Nothing },
         memory: base.memory,
         batch: 128 << random.below(4),
         rate,
@@ -154,7 +158,7 @@ fn one(wish: &Wish, rung: usize, index: usize, data: (&[Trajectory], &[Trajector
     recipe.epochs = wish.epochs * KEPT.pow(rung as u32);
     let begun = std::time::Instant::now();
     let validation_rms = match train::train(data.0, data.1, data.2, &recipe, None, &mut |_| {}) {
-        Ok(trained) => trained.curves.iter().map(|point| point.validation_rms).min_by(f64::total_cmp),
+        Ok(trained) => trained.best().map(|best| best.validation_rms),
         Err(TrainingError::Diverged { .. }) => None,
         Err(error) => return Err(error),
     };

@@ -42,7 +42,7 @@ impl Split {
     }
 }
 
-/// Test trajectories: they can be counted, and opened once, by whoever makes the final figures.
+/// Test trajectories, which can be counted and no more: `evaluate` reads the files itself.
 #[derive(Debug)]
 pub struct Sealed {
     trajectories: Vec<Trajectory>,
@@ -57,11 +57,6 @@ impl Sealed {
     /// Rows of all of them.
     pub fn rows(&self) -> usize {
         self.trajectories.iter().map(Trajectory::rows).sum()
-    }
-
-    /// Gives them out.
-    pub fn open(self) -> Vec<Trajectory> {
-        self.trajectories
     }
 }
 

@@ -56,7 +56,7 @@ fn one_trajectory_is_too_few() {
 fn inputs_that_never_change_are_refused() {
     let folder = Folder::new("constant");
     let files: Vec<PathBuf> = (0..3)
-        .map(|n| folder.text(&format!("{n}.csv"), &table("t_s,jpos_1_rad,truth_jpos_1_rad", |k| format!("0.5,{}", k + n))))
+        .map(|n| folder.text(&format!("{n}.csv"), &table("t_s,jpos_1_rad,truth_jpos_1_rad", |k| format!("0.5,{}", k + 1000 * n))))
         .collect();
     let found = line(&folder, &files, Some(columns(&["jpos_1_rad"], &["truth_jpos_1_rad"])));
     assert!(found.contains("all 1 inputs are constant"), "{found}");

@@ -4,16 +4,25 @@
 mod common;
 
 use common::{Folder, runs, small};
+use std::path::PathBuf;
 use training::commands::{self, Event, Model, Wish};
 use training::data::{self, Reading};
 use training::evaluate;
+use training::preset::{First, Recipe};
 
 #[test]
 fn a_model_stopped_by_a_kill_ends_as_one_that_ran_through() {
     let folder = Folder::new("kill");
     let files = runs(&folder, 3, 3.0, ".mcap");
-    let (out, recipe, reading) = (folder.file("model.onnx"), small("paper"), Reading::default());
-    let wish = Wish { data: &files, reading: &reading, recipe: &recipe, out: &out };
+    // Batch normalisation and a constant rate; halved batches, decay and a rate that falls; after a line.
+    for (preset, first) in [("paper", First::Nothing), ("one-state", First::Nothing), ("one-state", First::Linear)] {
+        stopped_and_gone_on(&folder, &files, &Recipe { first, ..small(preset) });
+    }
+}
+
+fn stopped_and_gone_on(folder: &Folder, files: &[PathBuf], recipe: &Recipe) {
+    let (out, reading) = (folder.file("model.onnx"), Reading::default());
+    let wish = Wish { data: files, reading: &reading, recipe, out: &out };
     let (checkpoint, kept) = (folder.file("model.onnx.checkpoint"), folder.file("kept"));
     commands::train(&wish, &mut |event| {
         if matches!(event, Event::Epoch(progress) if progress.point.epoch == 2) {
@@ -142,4 +151,78 @@ fn the_same_run_twice_is_refused() {
         .expect_err("twins")
         .to_string();
     assert!(line.contains("the same run twice") && !out.exists(), "{line}");
+}
+
+#[test]
+fn a_stretch_of_a_run_is_the_run() {
+    let folder = Folder::new("stretch");
+    let mut files = runs(&folder, 3, 6.0, ".mcap");
+    let cut = folder.file("cut.csv");
+    // A table: the same rows without the first thousand.
+    let table = |file: &PathBuf, name: &str, skip: usize| {
+        let set = data::read(std::slice::from_ref(file), &Reading { truth_hz: 1000.0, ..Reading::default() }, &mut |_, _| {})
+            .expect("run");
+        let one = &set.trajectories[0];
+        let rows = one.inputs.chunks_exact(118).zip(one.labels.chunks_exact(3)).skip(skip);
+        let lines = rows.enumerate().map(|(k, (x, y))| format!("{},{},{},{}", k as f64 * 1e-3, x[0], x[1], y[0]));
+        folder.text(name, &(std::iter::once("t_s,a,b,out".to_owned()).chain(lines).collect::<Vec<_>>().join("\n") + "\n"))
+    };
+    let mut tables: Vec<PathBuf> = files.iter().enumerate().map(|(k, file)| table(file, &format!("run_{k}.csv"), 0)).collect();
+    tables.push(table(&files[1], "cut.csv", 1000));
+    assert_eq!(tables.last(), Some(&cut));
+    let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let columns = data::Columns { inputs: of(&["a", "b"]), truth: of(&["out"]), ..data::Columns::default() };
+    let reading = Reading { columns: Some(columns), ..Reading::default() };
+    let recipe = Recipe { epochs: 2, ..Recipe::ours().for_tables() };
+    let out = folder.file("model.onnx");
+    let train = |data: &[PathBuf]| commands::train(&Wish { data, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {});
+    let line = train(&tables).expect_err("a stretch").to_string();
+    assert!(line.contains("cut.csv: holds rows of run_1.csv: the same run twice"), "{line}");
+    train(&tables[..3]).expect("three runs");
+    let mut left = std::fs::read_dir(&folder.0).expect("folder").filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    assert!(!left.any(|name| name.contains("checkpoint")), "with a line and without, none is left");
+    files.clear();
+    let report = |data: &[PathBuf]| {
+        let wish = evaluate::Wish { model: &out, data, reading: &reading, rivals: false, out: &folder.file("report"), seed: 1 };
+        evaluate::evaluate(&wish, &mut |_| {})
+    };
+    // Whichever set run 1 fell into: its stretch is judged on only if the run was not learnt from or chosen by.
+    let whole = report(&tables[1..2]).map(|report| report.rows > 0).map_err(|error| error.to_string());
+    let part = report(&tables[3..]).map(|report| report.rows > 0).map_err(|error| error.to_string());
+    assert_eq!(whole, part);
+    let seen: usize = tables[..3].iter().map(|table| usize::from(report(std::slice::from_ref(table)).is_err())).sum();
+    assert_eq!(seen, 2, "one of three is the test");
+    // Other columns than those of training are refused.
+    let swapped = data::Columns { inputs: of(&["b", "a"]), truth: of(&["out"]), ..data::Columns::default() };
+    let reading = Reading { columns: Some(swapped), ..Reading::default() };
+    let wish =
+        evaluate::Wish { model: &out, data: &tables, reading: &reading, rivals: false, out: &folder.file("report"), seed: 1 };
+    let line = evaluate::evaluate(&wish, &mut |_| {}).expect_err("swapped").to_string();
+    assert!(line.contains("was trained on a b, not on b a"), "{line}");
+}
+
+#[test]
+fn what_is_learnt_is_less_than_half_wrong_on_a_run_that_nobody_saw() {
+    let folder = Folder::new("learns");
+    let files = runs(&folder, 6, 10.0, ".mcap");
+    for (preset, first) in [("default", First::Nothing), ("one-state", First::Linear)] {
+        let out = folder.file("model.onnx");
+        let recipe = Recipe { epochs: 60, first, batch: 32, ..small(preset) };
+        let reading = Reading { plays: recipe.plays(), ..Reading::default() };
+        commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
+        let wish = evaluate::Wish {
+            model: &out,
+            data: &files,
+            reading: &Reading::default(),
+            rivals: true,
+            out: &folder.file("report"),
+            seed: 1,
+        };
+        let report = evaluate::evaluate(&wish, &mut |_| {}).expect("report");
+        let rms = |name: &str| report.methods.iter().find(|method| method.name == name).expect("method").exact.vector.rms;
+        for name in ["model", "linear regression", "Gaussian process", "rigid + random forest", "static map of posture"] {
+            println!("{preset} {first:?}: {name} {:.3} of {:.3} mm", rms(name), rms("raw"));
+            assert!(rms(name) < 0.5 * rms("raw"), "{preset}: {name} {} of {}", rms(name), rms("raw"));
+        }
+    }
 }

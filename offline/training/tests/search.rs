@@ -99,3 +99,24 @@ fn recipes_are_drawn_from_the_whole_range_and_by_their_number_alone() {
     assert!(rates.iter().any(|rate| *rate < 6e-4) && rates.iter().any(|rate| *rate > 5e-3));
     assert!(all.iter().all(|recipe| recipe.memory));
 }
+
+#[test]
+fn tables_are_searched_too() {
+    let folder = Folder::new("search-tables");
+    let table = |k: usize| {
+        let row = |t: usize| {
+            let x = (0.7123 * k as f64 + (t * (k + 3)) as f64 * 0.01).sin();
+            format!("{},{x},{}", t as f64 * 0.01, 2.0 * x + 0.1 * x * x)
+        };
+        folder.text(
+            &format!("run_{k}.csv"),
+            &(std::iter::once("t_s,a,out".to_owned()).chain((0..300).map(row)).collect::<Vec<_>>().join("\n") + "\n"),
+        )
+    };
+    let files: Vec<PathBuf> = (0..3).map(table).collect();
+    let columns = training::data::Columns { inputs: vec!["a".to_owned()], truth: vec!["out".to_owned()], ..Default::default() };
+    let reading = Reading { columns: Some(columns), ..Reading::default() };
+    let (base, out) = (Recipe::ours().for_tables(), folder.file("out"));
+    let trials = search(&wish(&files, &reading, &base, &out), &mut |_, _| {}).expect("searched");
+    assert!(trials.iter().all(|trial| trial.recipe.preparation == training::prepare::Preparation::Standard));
+}

@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use gap::analysis::{Given, Options, Outcome, analyse};
-use gap::search::Thresholds;
 use gap_report::{Report, Role, Verdict};
 use simulator::RobotModel;
 
@@ -42,8 +41,7 @@ pub(crate) fn outcome(robot: &str, real: &[&str], sim: &[&str]) -> Option<Outcom
         };
         given.push(Given { id: (*name).to_owned(), real: read(name)?, real_sha256: "0".repeat(64), sim, notes: Vec::new() });
     }
-    let options =
-        Options { thresholds: Thresholds::default(), seed: 0, config_sha256: "0".repeat(64), trace: false, urdf_sha256: None };
+    let options = Options::default();
     let outcome = analyse(&model(robot), &given, &options, &mut |_| {}).expect("a report");
     println!("{}", gap_report::words(&outcome.report));
     Some(outcome)

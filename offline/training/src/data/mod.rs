@@ -3,6 +3,7 @@
 pub mod memory;
 mod noise;
 mod raven;
+mod sketch;
 mod table;
 
 use crate::error::{TrainingError, hex};
@@ -15,6 +16,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 pub use noise::add_noise;
+pub use sketch::Sketch;
 pub use table::Columns;
 
 /// One whole run. Rows are moments with truth.
@@ -36,6 +38,8 @@ pub struct Trajectory {
     pub unsettled_s: Vec<f64>,
     /// Number of the arm's board (`type` of its states); 0 where the file does not say.
     pub board: i32,
+    /// Of all states, or all rows of a table with truth, read at whatever rate.
+    pub sketch: Sketch,
     /// How long the run's own memory took to settle, s from its first state; none if it never did, or there is none.
     pub settled_after_s: Option<f64>,
 }
@@ -59,6 +63,11 @@ impl Trajectory {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time_s.len()
+    }
+
+    /// Had the run's own memory settled by a row? True where there is none.
+    pub fn is_settled(&self, row: usize) -> bool {
+        self.young_places.is_empty() || self.settled_after_s.is_some_and(|after_s| self.time_s[row] >= after_s)
     }
 
     /// The rows in which a memory of such an age had not settled, as it had them then; no rows where there is no memory.

@@ -120,6 +120,7 @@ impl<'a> Pairing<'a> {
             (self.start_ns, self.next_ns, self.doubt) = (None, i64::MIN, None);
         }
         features::extract(&state, self.side.index(), &mut self.features);
+        self.found.sketch.add(self.features);
         // As the service does it: what cannot be the robot's is not followed.
         if may_follow_recorded(&self.possible, &self.features) {
             self.follow(stamp_ns);
@@ -188,7 +189,7 @@ impl<'a> Pairing<'a> {
             let what = format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature));
             return Some(self.unfit(what, "remove the row or record again"));
         }
-        if label.iter().any(|part| part.abs() > ERROR_MAX_MM) {
+        if norm(label) > ERROR_MAX_MM {
             let what = format!("truth and reported tip are {:.0} mm apart {time_s:.3} s after the first truth", norm(label));
             return Some(
                 self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm"),

@@ -2,8 +2,9 @@
 
 use super::{DataSet, Trajectory};
 use crate::error::{TrainingError, shown};
+use recordings::csv::{self, CsvProblem};
 use recordings::open::{Kind, kind, open_table};
-use recordings::{Recording, csv, table};
+use recordings::{Recording, table};
 use std::path::Path;
 
 /// Which columns of a table are what.
@@ -67,15 +68,17 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
             left_out += 1;
             continue;
         }
+        let labels: Vec<f32> = (0..truth.len())
+            .map(|output| (truth[output][row] - reported.get(output).map_or(0.0, |column| column[row])) as f32)
+            .collect();
+        found.sketch.add(values.iter().map(|value| *value as f32).chain(labels.iter().copied()));
         if recording.time_s().is_some() && time_s < next_s {
             continue;
         }
         next_s = time_s + 1.0 / truth_hz - 1e-9;
         found.time_s.push(time_s);
         found.inputs.extend(values.iter().chain(&remembered).map(|value| *value as f32));
-        for (output, column) in truth.iter().enumerate() {
-            found.labels.push((column[row] - reported.get(output).map_or(0.0, |column| column[row])) as f32);
-        }
+        found.labels.extend(labels);
     }
     if left_out > 0 {
         notes.push(format!("{}: {left_out} rows without truth left out", shown(file)));
@@ -100,12 +103,20 @@ fn recording(file: &Path) -> Result<Recording, TrainingError> {
         // Strict about units where the file is tidy; tables without a time are read as they are.
         match csv::read_with_gaps(file) {
             Ok(recording) => return Ok(recording),
-            Err(error) if !error.to_string().contains("t_s") => return Err(refused(&error)),
-            Err(_) => {}
+            Err(error) if matches!(*error.problem, CsvProblem::TimeNotFirst) => {}
+            Err(error) => return Err(refused(&error)),
         }
     }
     let mut source = open_table(file).map_err(|error| refused(&error))?;
-    table::collect(&file.display().to_string(), source.as_mut()).map_err(|error| refused(&error))
+    let found = table::collect(&file.display().to_string(), source.as_mut()).map_err(|error| refused(&error))?;
+    match source.damage() {
+        None => Ok(found),
+        Some(damage) => Err(TrainingError::Unfit {
+            file: shown(file),
+            what: format!("{}: {}", damage.place, damage.what),
+            remedy: "copy the file again, or cut off what stands behind",
+        }),
+    }
 }
 
 /// Columns by their name in the file or by the SI name that the reader gave them.

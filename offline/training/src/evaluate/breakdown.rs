@@ -1,6 +1,6 @@
 //! RMS before and after, and how often the bound holds, by region of the workspace, speed, direction, torque, and time into the run.
 
-use super::Rest;
+use super::{Rest, Trust};
 use crate::data::Trajectory;
 use serde::Serialize;
 
@@ -42,25 +42,28 @@ struct Row<'a> {
     held: f64,
 }
 
-/// All cells; `bound95` may be empty.
-pub(super) fn cells(test: &[Trajectory], estimates: &[Rest], bound95: &[f64]) -> Vec<Cell> {
+/// All cells; a bound may be missing.
+pub(super) fn cells(test: &[Trajectory], estimates: &[Rest], trust: &Trust) -> Vec<Cell> {
     let rows: Vec<Row> = test
         .iter()
         .zip(estimates)
         .flat_map(|(one, estimate)| {
             let width = (one.inputs.len() / one.rows().max(1)).max(1);
             let inputs = one.time_s.iter().zip(one.inputs.chunks_exact(width));
-            inputs.zip(one.exact.chunks_exact(3).zip(estimate.chunks_exact(3))).map(|((time_s, inputs), (truth, estimate))| {
-                let rest = |axis: usize| f64::from(truth[axis] - estimate[axis]);
-                let inside = bound95.iter().enumerate().filter(|(axis, bound)| rest(*axis).abs() <= **bound).count();
-                Row {
-                    time_s: *time_s,
-                    inputs,
-                    before: (0..3).map(|axis| f64::from(truth[axis]).powi(2)).sum(),
-                    after: (0..3).map(|axis| rest(axis).powi(2)).sum(),
-                    held: inside as f64 / bound95.len() as f64,
-                }
-            })
+            inputs.zip(one.exact.chunks_exact(3).zip(estimate.chunks_exact(3))).enumerate().map(
+                move |(row, ((time_s, inputs), (truth, estimate)))| {
+                    let rest = |axis: usize| f64::from(truth[axis] - estimate[axis]);
+                    let bound95 = trust.published(one, row);
+                    let inside = bound95.iter().enumerate().filter(|(axis, bound)| rest(*axis).abs() <= **bound).count();
+                    Row {
+                        time_s: *time_s,
+                        inputs,
+                        before: (0..3).map(|axis| f64::from(truth[axis]).powi(2)).sum(),
+                        after: (0..3).map(|axis| rest(axis).powi(2)).sum(),
+                        held: inside as f64 / bound95.len() as f64,
+                    }
+                },
+            )
         })
         .collect();
     let mut cells = Vec::new();

@@ -15,11 +15,13 @@ const LEAVING: usize = 6;
 /// Judges bound and domain on trajectories with the model's estimates; `card` if the model watches the load.
 pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory], estimates: &[Rest], names: &[String]) -> Trust {
     let numbers = |key: &str| -> Vec<f64> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
-    let bound95 = numbers("ravenpose.bound95_mm");
-    let mut trust = Trust { bound95, ..Trust::default() };
+    // As the inputs are: a constant of a card is exactly its float32.
+    let floats = |key: &str| -> Vec<f32> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
+    let (bound95, bound95_unsettled) = (numbers("ravenpose.bound95_mm"), numbers("ravenpose.bound95_unsettled_mm"));
+    let mut trust = Trust { bound95, bound95_unsettled, ..Trust::default() };
     coverage(&mut trust, test, estimates);
-    let (low, high) = (numbers("ravenpose.feature_min"), numbers("ravenpose.feature_max"));
-    let (center, weight) = (numbers("ravenpose.domain_center"), numbers("ravenpose.domain_weight"));
+    let (low, high) = (floats("ravenpose.feature_min"), floats("ravenpose.feature_max"));
+    let (center, weight) = (floats("ravenpose.domain_center"), floats("ravenpose.domain_weight"));
     let limit = model.number("ravenpose.domain_limit").unwrap_or(f64::INFINITY);
     let inputs = model.chain.inputs().max(1);
     let mut left = vec![0_usize; low.len()];
@@ -28,13 +30,13 @@ pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory],
     for row in test.iter().flat_map(|one| one.inputs.chunks_exact(inputs)) {
         let mut inside = true;
         for (((value, low), high), left) in row.iter().zip(&low).zip(&high).zip(&mut left) {
-            if !(f64::from(*value) >= *low && f64::from(*value) <= *high) {
+            if !(low..=high).contains(&value) {
                 *left += 1;
                 inside = false;
             }
         }
         outside += usize::from(!inside);
-        let squares: f64 = row.iter().zip(&center).zip(&weight).map(|((x, c), w)| ((f64::from(*x) - c) * w).powi(2)).sum();
+        let squares: f64 = row.iter().zip(&center).zip(&weight).map(|((x, c), w)| f64::from((x - c) * w).powi(2)).sum();
         let is_beyond = squares.sqrt() > limit;
         beyond += usize::from(is_beyond);
         doubtful.push(!inside || is_beyond);
@@ -56,12 +58,11 @@ pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory],
             load::weigh(card, model.chain.plays.len(), [one], |row| admitted[row])
         };
         let weighed: Vec<Weighed> = test.iter().map(weighed).collect();
-        trust.load = Some(observed(card, test, estimates, &trust.bound95, &weighed));
+        trust.load = Some(observed(card, test, estimates, &trust, &weighed));
         let unseen = weighed.iter().flat_map(|one| &one.unseen);
         doubtful.iter_mut().zip(unseen).for_each(|(doubtful, unseen)| *doubtful |= unseen);
     }
     trust.far_off = model.number(VALIDATION_RMS).map(|rms| far_off(3.0 * rms, test, estimates, &doubtful));
-    trust.bound95_unsettled = numbers("ravenpose.bound95_unsettled_mm");
     trust.unsettled = AGES_S.iter().filter_map(|age_s| unsettled(model, test, &trust.bound95_unsettled, age_s)).collect();
     trust
 }
@@ -86,13 +87,15 @@ fn far_off(limit: f64, test: &[Trajectory], estimates: &[Rest], doubtful: &[bool
     FarOff { limit, rows: percent(far.len(), doubtful.len().max(1)), flagged: percent(flagged, far.len()) }
 }
 
-fn observed(card: &LoadCard, test: &[Trajectory], estimates: &[Rest], bound95: &[f64], weighed: &[Weighed]) -> Load {
+fn observed(card: &LoadCard, test: &[Trajectory], estimates: &[Rest], trust: &Trust, weighed: &[Weighed]) -> Load {
     let (mut others, mut inside) = (0_usize, 0_usize);
     for ((one, estimate), weighed) in test.iter().zip(estimates).zip(weighed) {
-        for ((truth, estimate), _) in rows(one, estimate).zip(&weighed.unseen).filter(|(_, unseen)| !**unseen) {
+        for (row, ((truth, estimate), _)) in
+            rows(one, estimate).zip(&weighed.unseen).enumerate().filter(|(_, (_, unseen))| !**unseen)
+        {
             let rests = truth.iter().zip(estimate).map(|(truth, estimate)| f64::from((truth - estimate).abs()));
             others += truth.len();
-            inside += rests.zip(bound95).filter(|(rest, bound)| rest <= *bound).count();
+            inside += rests.zip(trust.published(one, row)).filter(|(rest, bound)| rest <= *bound).count();
         }
     }
     let first = |(one, weighed): (&Trajectory, &Weighed)| Some(one.time_s[weighed.unseen.iter().position(|unseen| *unseen)?]);
@@ -137,8 +140,8 @@ fn coverage(trust: &mut Trust, test: &[Trajectory], estimates: &[Rest]) {
     let (mut rows, mut lowest, mut highest) = (0_usize, 100.0_f64, 0.0_f64);
     for (one, estimate) in test.iter().zip(estimates) {
         let mut held = 0;
-        for (truth, estimate) in one.exact.chunks_exact(outputs).zip(estimate.chunks_exact(outputs)) {
-            for (axis, bound) in trust.bound95.iter().enumerate() {
+        for (row, (truth, estimate)) in one.exact.chunks_exact(outputs).zip(estimate.chunks_exact(outputs)).enumerate() {
+            for (axis, bound) in trust.published(one, row).iter().enumerate() {
                 if f64::from((truth[axis] - estimate[axis]).abs()) <= *bound {
                     inside[axis] += 1;
                     held += 1;

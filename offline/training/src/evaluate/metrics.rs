@@ -30,7 +30,7 @@ pub struct AllFigures {
     pub vector: Figures,
 }
 
-/// A figure with its 95 % interval over trajectories.
+/// A figure with its 95 % interval over trajectories; of fewer than [`FEW`] from the lowest to the highest of one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Interval {
     /// The figure.
@@ -41,6 +41,8 @@ pub struct Interval {
     pub high: f64,
 }
 
+/// Fewer trajectories have no percentiles.
+pub const FEW: usize = 8;
 /// Resamples of the bootstrap.
 const RESAMPLES: usize = 2000;
 
@@ -113,7 +115,7 @@ fn rms_and_sd(all: &[Sums], chosen: &[usize]) -> (f64, f64) {
     (mean_square.sqrt(), (mean_square - means).max(0.0).sqrt())
 }
 
-/// By how many percent RMS and SD of the vector fall from `before` to `after`, with bootstrap intervals over trajectories.
+/// By how many percent RMS and SD of the vector fall from `before` to `after`, with intervals over trajectories (bootstrap).
 pub fn reductions(before: &[Rest], after: &[Rest], outputs: usize, seed: u64) -> (Interval, Interval) {
     let (a, b): (Vec<Sums>, Vec<Sums>) =
         (before.iter().map(|rest| sums(rest, outputs)).collect(), after.iter().map(|rest| sums(rest, outputs)).collect());
@@ -123,6 +125,10 @@ pub fn reductions(before: &[Rest], after: &[Rest], outputs: usize, seed: u64) ->
     };
     let everything: Vec<usize> = (0..a.len()).collect();
     let (rms, sd) = of(&everything);
+    if a.len() < FEW {
+        let (all_rms, all_sd): (Vec<f64>, Vec<f64>) = everything.iter().map(|one| of(&[*one])).unzip();
+        return (extent(rms, &all_rms), extent(sd, &all_sd));
+    }
     let mut random = Random::new(seed, 21);
     let (mut all_rms, mut all_sd): (Vec<f64>, Vec<f64>) =
         (0..RESAMPLES).map(|_| of(&everything.iter().map(|_| random.below(a.len())).collect::<Vec<_>>())).unzip();
@@ -131,6 +137,12 @@ pub fn reductions(before: &[Rest], after: &[Rest], outputs: usize, seed: u64) ->
 
 fn percent(before: f64, after: f64) -> f64 {
     if before > 0.0 { 100.0 * (1.0 - after / before) } else { 0.0 }
+}
+
+fn extent(value: f64, all: &[f64]) -> Interval {
+    let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Interval { value, low, high }
 }
 
 fn interval(value: f64, resampled: &mut [f64]) -> Interval {
@@ -158,8 +170,16 @@ mod tests {
     }
 
     #[test]
+    fn of_few_trajectories_the_interval_is_from_the_lowest_to_the_highest() {
+        let before: Vec<Rest> = vec![vec![1.0, -1.0]; 3];
+        let after: Vec<Rest> = [0.1, 0.2, 0.4].iter().map(|left| vec![*left, -left]).collect();
+        let (rms, _) = reductions(&before, &after, 1, 1);
+        assert!((rms.low - 60.0).abs() < 1e-4 && (rms.high - 90.0).abs() < 1e-4 && rms.low < rms.value && rms.value < rms.high);
+    }
+
+    #[test]
     fn half_of_the_error_is_half_of_the_error_in_every_resample() {
-        let before: Vec<Rest> = (1..6).map(|k| vec![k as f32, -1.0, 0.5, k as f32]).collect();
+        let before: Vec<Rest> = (1..10).map(|k| vec![k as f32, -1.0, 0.5, k as f32]).collect();
         let after: Vec<Rest> = before.iter().map(|rest| rest.iter().map(|x| x / 2.0).collect()).collect();
         let (rms, sd) = reductions(&before, &after, 2, 1);
         for found in [rms, sd] {

@@ -6,7 +6,7 @@ mod metrics;
 mod page;
 
 use crate::commands::{Model, write_whole};
-use crate::data::{self, Reading, Trajectory};
+use crate::data::{self, Reading, Sketch, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::rivals;
 use metrics::{AllFigures, Interval, Rest};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub use breakdown::{BY_TIME, Cell};
-pub use metrics::{Figures, figures, reductions};
+pub use metrics::{FEW, Figures, figures, reductions};
 
 /// What is to be evaluated.
 #[derive(Debug, Clone)]
@@ -65,7 +65,8 @@ pub struct Method {
 pub struct Trust {
     /// Stated half widths.
     pub bound95: Vec<f64>,
-    /// Share of rows within it per axis, percent, against the truth without added noise.
+    /// Share of rows within what the service publishes with them (until the memory has settled, the wider ones), per axis, percent,
+    /// against the truth without added noise.
     pub coverage: Vec<f64>,
     /// The same over all axes.
     pub coverage_all: f64,
@@ -90,6 +91,11 @@ pub struct Trust {
 }
 
 impl Trust {
+    /// Half widths that the service publishes with a row: the wider ones until the run's own memory has settled.
+    fn published(&self, one: &Trajectory, row: usize) -> &[f64] {
+        if self.bound95_unsettled.is_empty() || one.is_settled(row) { &self.bound95 } else { &self.bound95_unsettled }
+    }
+
     /// When the memory of each run had settled, in words; none for a model without a memory.
     pub fn settled(&self) -> Option<String> {
         let one = |after_s: &Option<f64>| after_s.map_or("never".to_owned(), |after_s| format!("{after_s:.1} s"));
@@ -207,13 +213,17 @@ pub struct Report {
 /// What a run is to a model.
 fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajectory>, usize) {
     let (train, validation) = (model.words("ravenpose.train_runs"), model.words("ravenpose.validation_runs"));
+    let sketches = |key: &str| model.words(key).into_iter().map(Sketch::of_word).collect::<Vec<_>>();
+    let (train_sketches, validation_sketches) = (sketches("ravenpose.train_sketches"), sketches("ravenpose.validation_sketches"));
+    let is_of = |one: &Trajectory, ids: &[&str], sketches: &[Sketch]| {
+        ids.contains(&one.id().as_str()) || sketches.iter().any(|sketch| sketch.overlaps(&one.sketch))
+    };
     let (mut learnt, mut unseen, mut known) = (Vec::new(), Vec::new(), 0);
     for one in all {
-        let id = one.id();
-        if train.contains(&id.as_str()) {
+        if is_of(&one, &train, &train_sketches) {
             known += 1;
             learnt.push(one);
-        } else if validation.contains(&id.as_str()) {
+        } else if is_of(&one, &validation, &validation_sketches) {
             known += 1;
         } else {
             unseen.push(one);
@@ -228,6 +238,9 @@ fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajector
 /// [`TrainingError`]: model, data, or a folder that cannot be written.
 pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
     let model = Model::read(wish.model)?;
+    if wish.out.is_file() {
+        return Err(TrainingError::file(wish.out, "is a file", "give a folder with --out"));
+    }
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
         truth_noise_mm: model.number("ravenpose.truth_noise_mm").unwrap_or(0.0),
@@ -244,6 +257,14 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             set.outputs()
         );
         return Err(TrainingError::Model { file: shown(wish.model), what });
+    }
+    for (key, found) in [("ravenpose.inputs", &set.input_names), ("ravenpose.outputs", &set.output_names)] {
+        let of_training = model.card.get(key).filter(|_| !set.is_raven);
+        if of_training.is_some_and(|words| *words != found.join(" ")) {
+            let what = format!("was trained on {}, not on {}", of_training.map_or("", String::as_str), found.join(" "));
+            let remedy = "give --inputs, --truth, --reported and --plays as they were given to `ravenpose train`";
+            return Err(TrainingError::Unfit { file: shown(wish.model), what, remedy });
+        }
     }
     let outputs = set.outputs();
     if !set.is_raven && !model.chain.plays.is_empty() {
@@ -311,7 +332,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         rows: judge.rows(),
         runs_of_training: known,
         methods,
-        breakdown: if set.is_raven { breakdown::cells(&test, &estimates, &trust.bound95) } else { Vec::new() },
+        breakdown: if set.is_raven { breakdown::cells(&test, &estimates, &trust) } else { Vec::new() },
         trust,
         seed: wish.seed,
         notes,

@@ -1,6 +1,6 @@
 //! The report as one self-contained page.
 
-use super::{Interval, Method, Report, Rest};
+use super::{FEW, Interval, Method, Report, Rest};
 use crate::data::Trajectory;
 use plot::figure::{Axis, Colour, Figure, Mark, Panel};
 use plot::page::{Block, Page};
@@ -15,9 +15,10 @@ pub(super) fn page(report: &Report, test: &[Trajectory], estimates: &[Rest], uni
     blocks.push(Block::Heading("Methods side by side".to_owned()));
     blocks.push(Block::Text(format!(
         "On {} whole trajectories ({} rows) that took part in nothing before. Figures of the vector in {unit}, against the truth \
-         without added noise; in brackets 95 % over trajectories (bootstrap).",
+         without added noise; in brackets {}.",
         report.runs.len(),
-        report.rows
+        report.rows,
+        if report.runs.len() < FEW { "the lowest and the highest of one trajectory" } else { "95 % over trajectories (bootstrap)" }
     )));
     blocks.push(methods(&report.methods));
     blocks.push(Block::Heading("Per axis".to_owned()));

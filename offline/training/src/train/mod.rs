@@ -1,13 +1,15 @@
 //! Training: epochs over shuffled rows of whole trajectories, the best by validation kept.
 
 mod checkpoint;
+mod linear;
 
 use crate::data::Trajectory;
 use crate::error::TrainingError;
 use crate::network::{Adam, Network, NormPlace};
 use crate::prepare::Prepared;
-use crate::preset::{Recipe, Schedule};
+use crate::preset::{First, Recipe, Schedule};
 use crate::random::Random;
+use linear::Linear;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -23,7 +25,7 @@ const WARM_UP: f64 = 0.05;
 /// One point of the learning curves; 3D RMS of the rest, in the labels' unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// From 1.
+    /// From 1; 0 is what a line leaves before the network learns.
     pub epoch: usize,
     /// On the rows of training, as they were learnt from.
     pub train_rms: f64,
@@ -59,9 +61,16 @@ pub struct Trained {
     pub curves: Vec<Point>,
     /// Wall time of all epochs, s.
     pub seconds: f64,
+    /// Is there a line that the network learnt the rest of?
+    pub has_line: bool,
 }
 
 impl Trained {
+    /// Least RMS on the validation trajectories, with its epoch.
+    pub fn best(&self) -> Option<&Point> {
+        self.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms))
+    }
+
     /// Estimates for rows of raw inputs, row-major, in the labels' unit.
     pub fn estimate(&self, inputs: &[f32]) -> Vec<f32> {
         let raw = self.prepared.mean.len().max(1);
@@ -104,20 +113,32 @@ pub fn train(
     checkpoint: Option<&Path>,
     told: &mut dyn FnMut(&Progress),
 ) -> Result<Trained, TrainingError> {
+    if recipe.first == First::Either {
+        return either(train, validation, outputs, recipe, checkpoint, told);
+    }
     let inputs = train.first().map_or(0, |one| one.inputs.len() / one.rows().max(1));
     let prepared = Prepared::fit(train, inputs, recipe.preparation)?;
     let (label_mean, label_scale) = label_statistics(train, outputs);
     let rows = |set: &[Trajectory]| Rows::of(set, &prepared, &label_mean, label_scale);
-    let (learnt, chosen) = (rows(train), rows(validation));
+    let (mut learnt, mut chosen) = (rows(train), rows(validation));
+    let line = (recipe.first == First::Linear).then(|| Linear::fit(&learnt, &chosen, recipe.hidden.len()));
     let widths = [&[prepared.width()], recipe.hidden.as_slice(), &[outputs]].concat();
     let mut course = Course::begin(&widths, recipe);
+    if let Some(line) = &line {
+        for rows in [&mut learnt, &mut chosen] {
+            rows.y -= &line.of(&rows.x);
+        }
+        let of = |rows: &Rows| rms(&course.network, rows) * label_scale;
+        let point = Point { epoch: 0, train_rms: of(&learnt), validation_rms: of(&chosen) };
+        course.curves.push(point);
+    }
     let identity = checkpoint::identity(recipe, train, validation);
     if let Some(file) = checkpoint.filter(|file| file.exists()) {
         checkpoint::load(file, &identity, &mut course)?;
     }
-    while course.curves.len() < recipe.epochs && !course.is_stale(recipe.patience) {
+    while course.epochs() < recipe.epochs && !course.is_stale(recipe.patience) {
         let begun = Instant::now();
-        let epoch = course.curves.len() + 1;
+        let epoch = course.epochs() + 1;
         let train_rms = course.epoch(&learnt, recipe) * label_scale;
         let validation_rms = rms(&course.network, &chosen) * label_scale;
         if !(train_rms.is_finite() && validation_rms.is_finite()) {
@@ -136,7 +157,36 @@ pub fn train(
         let left_s = course.seconds / epoch as f64 * (recipe.epochs - epoch) as f64;
         told(&Progress { point, epochs: recipe.epochs, epoch_s, left_s });
     }
-    Ok(Trained { network: course.best, prepared, label_mean, label_scale, curves: course.curves, seconds: course.seconds })
+    let has_line = line.is_some();
+    let network = match line {
+        Some(line) => line.joined(course.best),
+        None => course.best,
+    };
+    Ok(Trained { network, prepared, label_mean, label_scale, curves: course.curves, seconds: course.seconds, has_line })
+}
+
+/// With a line first, and without: what leaves less on validation.
+fn either(
+    learnt: &[Trajectory],
+    validation: &[Trajectory],
+    outputs: usize,
+    recipe: &Recipe,
+    checkpoint: Option<&Path>,
+    told: &mut dyn FnMut(&Progress),
+) -> Result<Trained, TrainingError> {
+    let mut with = |first: First, extension: &str| {
+        let checkpoint = checkpoint.map(|file| file.with_added_extension(extension));
+        let trained = train(learnt, validation, outputs, &Recipe { first, ..recipe.clone() }, checkpoint.as_deref(), told)?;
+        Ok::<_, TrainingError>((trained, checkpoint))
+    };
+    let (a, b) = (with(First::Nothing, "nothing")?, with(First::Linear, "linear")?);
+    // Only now: until both are there a kill must not lose the first.
+    for file in [a.1, b.1].into_iter().flatten() {
+        drop(std::fs::remove_file(file));
+    }
+    let left = |trained: &Trained| trained.best().map_or(f64::INFINITY, |best| best.validation_rms);
+    let seconds = a.0.seconds + b.0.seconds;
+    Ok(Trained { seconds, ..if left(&a.0) <= left(&b.0) { a.0 } else { b.0 } })
 }
 
 /// Mean per output, and one scale for all: the RMS deviation over all outputs.
@@ -170,14 +220,23 @@ impl Course {
     fn begin(widths: &[usize], recipe: &Recipe) -> Self {
         let mut random = Random::new(recipe.seed, LEARNING);
         let mut network = Network::new(widths, recipe.activation, recipe.norm, &mut random);
+        // After a line the network begins as nothing.
+        if let (First::Linear, Some(last)) = (recipe.first, network.layers.last_mut()) {
+            last.weight.fill(0.0);
+        }
         let adam = Adam::new(network.numbers().iter().map(|numbers| numbers.len()));
         Self { best: network.clone(), network, adam, random, curves: Vec::new(), seconds: 0.0 }
+    }
+
+    /// Epochs so far.
+    fn epochs(&self) -> usize {
+        self.curves.last().map_or(0, |point| point.epoch)
     }
 
     /// No better validation for so many epochs?
     fn is_stale(&self, patience: usize) -> bool {
         let best = self.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
-        best.is_some_and(|best| self.curves.len() - best.epoch >= patience)
+        best.is_some_and(|best| self.epochs() - best.epoch >= patience)
     }
 
     /// One pass over all rows in random order; the RMS on the way, in units of the network's output.

@@ -1,0 +1,75 @@
+//! Which rows a run is made of, in a few numbers: do two files hold the same stretch of motion, whatever they are called and wherever
+//! they begin? The smallest hashes of a run's rows (bottom-k sketch; Broder 1997): of two runs that share a part of their rows they share
+//! the same part.
+
+use std::collections::BTreeSet;
+
+/// Hashes kept of each run.
+const KEPT: usize = 64;
+/// Share of the hashes, as its reciprocal, from which on two runs overlap, and least number of them.
+const SHARE: usize = 16;
+const LEAST: usize = 2;
+
+/// The smallest hashes of a run's rows.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Sketch(BTreeSet<u64>);
+
+impl Sketch {
+    /// Adds a row, every number as it was read.
+    pub fn add(&mut self, row: impl IntoIterator<Item = f32>) {
+        // Steele, Lea and Flood's mixing of 64 bits (SplitMix).
+        let mix = |x: u64| {
+            let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            x ^ (x >> 31)
+        };
+        let hash =
+            row.into_iter().fold(0, |hash, number| mix(hash ^ u64::from(number.to_bits())).wrapping_add(0x9e37_79b9_7f4a_7c15));
+        if self.0.len() < KEPT || self.0.last().is_some_and(|last| hash < *last) {
+            self.0.insert(hash);
+            if self.0.len() > KEPT {
+                self.0.pop_last();
+            }
+        }
+    }
+
+    /// Do the two hold a sixteenth of the same rows?
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let least = (self.0.len().min(other.0.len()) / SHARE).max(LEAST);
+        self.0.intersection(&other.0).take(least).count() == least
+    }
+
+    /// As one word.
+    pub fn word(&self) -> String {
+        self.0.iter().map(|hash| format!("{hash:016x}")).collect::<Vec<_>>().join(".")
+    }
+
+    /// From its word; what is no hash is left out.
+    pub fn of_word(word: &str) -> Self {
+        Self(word.split('.').filter_map(|hash| u64::from_str_radix(hash, 16).ok()).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_of_a_run_are_known_wherever_they_begin_and_other_runs_are_not() {
+        let of = |rows: std::ops::Range<u32>| {
+            let mut sketch = Sketch::default();
+            rows.for_each(|row| sketch.add([(row as f32).sin(), row as f32]));
+            sketch
+        };
+        let whole = of(0..30_000);
+        for part in [of(0..30_000), of(137..30_000), of(20_000..25_000), of(29_000..90_000), of(0..30)] {
+            assert_eq!(part.overlaps(&whole), part != of(0..30), "a thousandth says nothing");
+            assert_eq!(Sketch::of_word(&part.word()), part);
+        }
+        assert!(!of(30_000..60_000).overlaps(&whole) && !Sketch::default().overlaps(&whole));
+        // Rows that come again, as where a robot stands, count once.
+        let mut standing = Sketch::default();
+        (0..1000).for_each(|_| standing.add([1.0, 2.0]));
+        assert!(!standing.overlaps(&standing.clone()));
+    }
+}
