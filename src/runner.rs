@@ -59,7 +59,7 @@ enum Waited {
 }
 
 struct Link {
-    /// Taken while there was nothing else to do; before the writer, so that it is given back first.
+    /// Taken while there was nothing else to do.
     next: Option<Loan<CorrectedPose>>,
     reader: Reader<RavenState>,
     writer: Writer<CorrectedPose>,
@@ -247,6 +247,7 @@ impl<E: Estimator> Runner<E> {
             }
             Wait::Sleep if self.misses > MISSES_MAX => {
                 let wake = self.phase.expected_ns(now).min(stale);
+                self.prepare();
                 sleep_until_ns(wake);
                 self.recorder.record(Stage::Wakeup, now_ns() - wake);
                 Waited::Slept
@@ -254,6 +255,8 @@ impl<E: Estimator> Runner<E> {
             Wait::Sleep => {
                 let plan = self.phase.plan(now);
                 let wake = plan.wake_ns.min(stale);
+                // A state may be there after it, and the answer to one that is late should not wait for a place.
+                self.prepare();
                 sleep_until_ns(wake);
                 if wake > now {
                     self.recorder.record(Stage::Wakeup, now_ns() - wake);

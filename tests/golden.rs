@@ -4,6 +4,7 @@ mod common;
 
 use ravenpose::model;
 use ravenpose::network::{Format, InstructionSet, Plan};
+use ravenpose_importer::{Activation, Network};
 use std::path::Path;
 
 /// Tolerance by model, as `models/README.md` states it.
@@ -126,7 +127,7 @@ fn bound_mm(format: Format) -> f64 {
     }
 }
 
-fn every_plan(network: &ravenpose_importer::Network) -> Vec<Plan> {
+fn every_plan(network: &Network) -> Vec<Plan> {
     let formats = |set| Format::ALL.into_iter().map(move |format| (set, format));
     InstructionSet::present().flat_map(formats).map(|(set, format)| Plan::with(network, set, format)).collect()
 }
@@ -180,14 +181,25 @@ fn one_format_gives_the_same_on_every_instruction_set() {
     }
 }
 
+/// Of two layers and of three: the first and the last keep 16 bits in every format.
 #[test]
 fn odd_widths_are_padded_right_in_every_format_on_every_instruction_set() {
-    use ravenpose_importer::{Activation, Network};
     let mut rng = common::Rng(9);
     let activations = [Activation::Sigmoid, Activation::Tanh, Activation::Relu, Activation::Elu { alpha: 1.0 }];
-    for widths in [[1, 1, 1], [3, 17, 5], [118, 129, 3], [16, 64, 16], [65, 200, 33]] {
+    let all: [&[usize]; 9] = [
+        &[1, 1, 1],
+        &[3, 17, 5],
+        &[118, 129, 3],
+        &[16, 64, 16],
+        &[65, 200, 33],
+        &[118, 17, 33, 3],
+        &[5, 129, 49, 2],
+        &[33, 65, 97, 3],
+        &[7, 200, 130, 1],
+    ];
+    for widths in all {
         for activation in activations {
-            let mut network = Network::dense(&widths, activation, |_, _| rng.uniform() as f32 - 0.5);
+            let mut network = Network::dense(widths, activation, |_, _| rng.uniform() as f32 - 0.5);
             for bias in network.layers.iter_mut().flat_map(|layer| &mut layer.bias) {
                 *bias = rng.uniform() as f32 - 0.5;
             }
@@ -195,7 +207,7 @@ fn odd_widths_are_padded_right_in_every_format_on_every_instruction_set() {
             let truth = network.evaluate_f64(&input);
             let size = truth.iter().fold(1.0_f64, |size, y| size.max(y.abs()));
             for mut plan in every_plan(&network) {
-                let mut output = vec![0.0_f32; widths[2]];
+                let mut output = vec![0.0_f32; widths[widths.len() - 1]];
                 plan.run(&input, &mut output);
                 for (found, truth) in output.iter().zip(&truth) {
                     let error = (f64::from(*found) - truth).abs() / size;
@@ -206,22 +218,36 @@ fn odd_widths_are_padded_right_in_every_format_on_every_instruction_set() {
     }
 }
 
+/// The middle layer of three, behind one that copies a number to all its inputs with the sign that `of` gives them.
+fn behind_copies(of: &dyn Fn(usize) -> f32, inputs: usize, outputs: usize, weight: &dyn Fn(usize, usize) -> f32) -> Network {
+    // The number of inputs of each layer tells which it is.
+    assert!(inputs != 2 && inputs != outputs && outputs != 2);
+    Network::dense(&[2, inputs, outputs, 3], Activation::Identity, |place, wide| match (wide, place / wide, place % wide) {
+        (2, row, 0) => of(row),
+        (2, ..) => 0.0,
+        (wide, row, column) if wide == inputs => weight(row, column),
+        (_, row, column) => f32::from(u8::from(row == column)),
+    })
+}
+
 #[test]
 fn the_largest_sums_do_not_overflow_in_any_format_on_any_instruction_set() {
-    use ravenpose_importer::{Activation, Network};
     // Every weight and every input as large as its format holds, of one sign and of alternating ones, over several blocks of a sum.
-    for inputs in [2, 511, 512, 513, 1301, 4000] {
+    for inputs in [4, 511, 512, 513, 1301, 4000] {
         for alternating in [false, true] {
             let sign = |place: usize| if alternating && place % 2 == 1 { -1.0 } else { 1.0 };
-            let network = Network::dense(&[inputs, 17, 3], Activation::Identity, |place, wide| sign(place % wide));
-            let input: Vec<f32> = (0..inputs).map(|place| 3.0 * sign(place)).collect();
-            let truth = network.evaluate_f64(&input);
-            for mut plan in every_plan(&network) {
-                let mut output = [0.0_f32; 3];
-                plan.run(&input, &mut output);
-                for (found, truth) in output.iter().zip(&truth) {
-                    let error = (f64::from(*found) / truth - 1.0).abs();
-                    assert!(error < 1e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+            let alone = Network::dense(&[inputs, 17, 3], Activation::Identity, |place, wide| sign(place % wide));
+            let direct: Vec<f32> = (0..inputs).map(|place| 3.0 * sign(place)).collect();
+            let middle = behind_copies(&sign, inputs, 17, &|_, column| sign(column));
+            for (network, input) in [(alone, direct), (middle, vec![3.0, 0.0])] {
+                let truth = network.evaluate_f64(&input);
+                for mut plan in every_plan(&network) {
+                    let mut output = [0.0_f32; 3];
+                    plan.run(&input, &mut output);
+                    for (found, truth) in output.iter().zip(&truth) {
+                        let error = (f64::from(*found) / truth - 1.0).abs();
+                        assert!(error < 1e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+                    }
                 }
             }
         }
@@ -230,24 +256,30 @@ fn the_largest_sums_do_not_overflow_in_any_format_on_any_instruction_set() {
 
 #[test]
 fn rows_of_zeros_and_of_one_weight_are_right_in_every_format_on_every_instruction_set() {
-    use ravenpose_importer::{Activation, Network};
     for inputs in [118, 600, 4000] {
         // Output 0 has no weight, output 1 one, output 2 every seventh.
-        let weight = |place: usize, wide: usize| match (place / wide, place % wide) {
-            (1, column) if column == wide / 2 => 0.5,
-            (2, column) if column % 7 == 0 => 0.25,
+        let weight = |row: usize, column: usize| match row {
+            1 if column == inputs / 2 => 0.5,
+            2 if column.is_multiple_of(7) => 0.25,
             _ => 0.0,
         };
-        let mut network = Network::dense(&[inputs, 3], Activation::Identity, weight);
-        network.layers[0].bias = vec![1.5, -2.0, 0.25];
-        let input: Vec<f32> = (0..inputs).map(|place| (place as f32 * 0.37).sin()).collect();
-        let truth = network.evaluate_f64(&input);
-        for mut plan in every_plan(&network) {
-            let mut output = [0.0_f32; 3];
-            plan.run(&input, &mut output);
-            for (found, truth) in output.iter().zip(&truth) {
-                let error = (f64::from(*found) - truth).abs() / truth.abs().max(1.0);
-                assert!(error < 1e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+        let mut alone = Network::dense(&[inputs, 3], Activation::Identity, |place, wide| weight(place / wide, place % wide));
+        alone.layers[0].bias = vec![1.5, -2.0, 0.25];
+        // Numbers that every format of weights holds.
+        let wave = |place: usize| ((place as f32 * 0.37).sin() * 64.0).round() / 64.0;
+        let direct: Vec<f32> = (0..inputs).map(wave).collect();
+        let mut middle = behind_copies(&wave, inputs, 3, &weight);
+        middle.layers[1].bias = vec![1.5, -2.0, 0.25];
+        for (network, input) in [(alone, direct), (middle, vec![1.0, 0.0])] {
+            let truth = network.evaluate_f64(&input);
+            for mut plan in every_plan(&network) {
+                let mut output = [0.0_f32; 3];
+                plan.run(&input, &mut output);
+                for (found, truth) in output.iter().zip(&truth) {
+                    let error = (f64::from(*found) - truth).abs() / truth.abs().max(1.0);
+                    // Sums of up to 572 numbers of 16 bits.
+                    assert!(error < 4e-4, "{inputs} inputs, {}: {found} {truth}", name(&plan));
+                }
             }
         }
     }

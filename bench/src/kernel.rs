@@ -96,24 +96,33 @@ impl Engine {
         }
     }
 
-    /// Flushes the weights from every cache; false where they cannot be reached.
+    /// Flushes the weights from every cache; false where they cannot be reached, or not flushed.
     fn flush(&self) -> bool {
         match self {
             Self::Floor(plan) | Self::Plan(plan) => plan.memory().for_each(|bytes| flush(bytes.as_ptr(), bytes.len())),
             Self::OnnxRuntime(_) | Self::OpenVino(_) | Self::Tract(_) => return false,
         }
-        true
+        cfg!(any(target_arch = "x86_64", target_arch = "aarch64"))
     }
 }
 
-/// Puts memory out of every cache.
+/// Puts memory out of every cache; on processors that are neither x86-64 nor 64-bit Arm nothing happens.
 pub(crate) fn flush(from: *const u8, length: usize) {
     #[cfg(target_arch = "x86_64")]
     for offset in (0..length).step_by(64) {
         // SAFETY: an address inside memory that the caller borrows; flushing changes no value.
         unsafe { std::arch::x86_64::_mm_clflush(from.add(offset)) };
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(target_arch = "aarch64")]
+    {
+        for offset in (0..length).step_by(64) {
+            // SAFETY: as above; Linux lets programs clean and invalidate lines.
+            unsafe { std::arch::asm!("dc civac, {}", in(reg) from.add(offset), options(nostack, preserves_flags)) };
+        }
+        // SAFETY: waits until that is done.
+        unsafe { std::arch::asm!("dsb ish", options(nostack, preserves_flags)) };
+    }
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     let _ = (from, length);
 }
 

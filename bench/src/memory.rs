@@ -33,9 +33,8 @@ fn plan(widths: &[usize]) -> Plan {
     Plan::with(&network, InstructionSet::best(), Format::I16)
 }
 
-/// Times of some runs; the first `ahead` bytes of the weights are read just before each.
-fn times(plan: &mut Plan, before: Before, ahead: usize, runs: usize) -> Vec<i64> {
-    let much = vec![1_u8; MUCH];
+/// Times of some runs; the first `ahead` bytes of the weights are read just before each. `much` is the other data.
+fn times(plan: &mut Plan, much: &[u8], before: Before, ahead: usize, runs: usize) -> Vec<i64> {
     let (input, mut output) = ([0.3_f32; 118], [0.0_f32; 3]);
     let mut next = now_ns();
     let taken = (0..runs)
@@ -65,12 +64,14 @@ fn times(plan: &mut Plan, before: Before, ahead: usize, runs: usize) -> Vec<i64>
 /// Runs once a millisecond, as a process of its own: prints the quantiles of each shape and the huge pages in use, KiB.
 pub(crate) fn asleep() -> String {
     let mut words = Vec::new();
-    for (_, widths) in SHAPES {
-        let mut plan = plan(&widths);
-        times(&mut plan, Before::Sleep, 0, TURN);
-        words.extend(quantiles(&mut times(&mut plan, Before::Sleep, 0, RUNS)).map(|us| format!("{us:.3}")));
+    let mut plans = SHAPES.map(|(_, widths)| plan(&widths));
+    for plan in &mut plans {
+        times(plan, &[], Before::Sleep, 0, TURN);
+        words.extend(quantiles(&mut times(plan, &[], Before::Sleep, 0, RUNS)).map(|us| format!("{us:.3}")));
     }
+    // While the weights are there.
     let rollup = std::fs::read_to_string("/proc/self/smaps_rollup").unwrap_or_default();
+    drop(plans);
     let huge = rollup.lines().find_map(|line| line.strip_prefix("AnonHugePages:")?.split_whitespace().next());
     words.push(huge.unwrap_or("0").to_owned());
     words.join(" ")
@@ -110,6 +111,7 @@ pub(crate) fn run(core: usize) -> Result<Table, String> {
         ("  and its weights on huge pages", huge),
         ("  and the core to itself (bench/shield.sh)", shielded),
     ];
+    let much = vec![1_u8; MUCH];
     let others = others.map(|(name, mut command)| {
         let found = elsewhere(command.arg("asleep"));
         match &found {
@@ -124,8 +126,8 @@ pub(crate) fn run(core: usize) -> Result<Table, String> {
         let mut all: Vec<Vec<i64>> = parts.iter().map(|_| Vec::new()).collect();
         for _ in 0..RUNS / TURN {
             for ((_, before, ahead), all) in parts.iter().zip(&mut all) {
-                times(&mut plan, *before, *ahead, 20);
-                all.extend(times(&mut plan, *before, *ahead, TURN));
+                times(&mut plan, &much, *before, *ahead, 20);
+                all.extend(times(&mut plan, &much, *before, *ahead, TURN));
             }
         }
         for ((name, ..), mut times) in parts.iter().zip(all) {

@@ -17,7 +17,7 @@ use super::instructions::{InstructionSet, LANE, Lane, Line};
 
 /// Inputs of a tile.
 const DEPTH: usize = 2;
-/// Most tiles side by side: as many sums as registers hold.
+/// Most tiles side by side: their sums, the digits and what is loaded fit the 16 registers of AVX2.
 const WIDTH: usize = 4;
 /// Pairs of products that are summed in whole numbers: as many certainly fit in 32 bits, of one byte by two (`2^31 / (2 * 127 * 32639)`)
 /// as of two by two, shifted (`2^31 / (2 * 32639^2 / 2^SHIFT)`, which is 258).
@@ -107,11 +107,12 @@ impl Pairs {
             InstructionSet::Portable => plain::run(self, bias, input, numbers, output),
             // SAFETY: `set` came from `InstructionSet::available`, which found AVX2 and FMA; the lengths were checked above.
             #[cfg(target_arch = "x86_64")]
-            _ => unsafe { avx2::run(self, bias, input, numbers, output) },
+            InstructionSet::Avx2 | InstructionSet::Avx512 | InstructionSet::Avx512Vnni => unsafe {
+                avx2::run(self, bias, input, numbers, output);
+            },
             // SAFETY: every aarch64 has NEON; the lengths were checked above.
             #[cfg(target_arch = "aarch64")]
-            _ => unsafe { neon::run(self, bias, input, numbers, output) },
-            #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+            InstructionSet::Neon => unsafe { neon::run(self, bias, input, numbers, output) },
             _ => plain::run(self, bias, input, numbers, output),
         }
     }

@@ -220,6 +220,7 @@ struct Checker {
     valid: u64,
     fallbacks: u64,
     reasons: u32,
+    dropped_by_queue: u64,
 }
 
 impl Checker {
@@ -328,13 +329,14 @@ fn run(seed: u64, count: u64) -> Checker {
         valid: 0,
         fallbacks: 0,
         reasons: 0,
+        dropped_by_queue: 0,
     };
     let mut pose = CorrectedPose::new();
     for _ in 0..count {
         world.advance();
         if world.stormy() && world.rng.chance(2000) {
-            // The service is stopped for a while and continued.
-            for _ in 0..10 + world.rng.below(200) {
+            // The service is stopped for a while, sometimes for longer than the queue holds, and continued.
+            for _ in 0..10 + world.rng.below(600) {
                 world.advance();
             }
         }
@@ -364,6 +366,7 @@ fn run(seed: u64, count: u64) -> Checker {
             world.truth.retain(|_, truth| truth.time_ns > horizon);
         }
     }
+    checker.dropped_by_queue = world.dropped_by_queue;
     checker
 }
 
@@ -371,16 +374,18 @@ fn run(seed: u64, count: u64) -> Checker {
 fn a_million_cycles_of_mixed_faults_keep_every_invariant() {
     const RUN: u64 = 50_000;
     let first: u64 = std::env::var("RAVENPOSE_FAULT_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(1);
-    let (mut valid, mut fallbacks, mut reasons) = (0, 0, 0);
+    let (mut valid, mut fallbacks, mut reasons, mut dropped) = (0, 0, 0, 0);
     for seed in first..first + cycles().div_ceil(RUN) {
         println!("seed {seed} (replay: RAVENPOSE_FAULT_SEED={seed} RAVENPOSE_FAULT_CYCLES={RUN})");
         let checker = run(seed, RUN);
         valid += checker.valid;
         fallbacks += checker.fallbacks;
         reasons |= checker.reasons;
+        dropped += checker.dropped_by_queue;
     }
     println!("{valid} valid and {fallbacks} fallback estimates, reasons {reasons:#06x}");
     assert!(valid > cycles() / 4 && fallbacks > cycles() / 4, "both states were exercised");
+    assert!(dropped > cycles() / 1000, "{dropped} states did not fit the queue");
     for reason in [
         flag::INPUT_NOT_FINITE,
         flag::INPUT_STALE,

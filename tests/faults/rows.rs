@@ -469,11 +469,13 @@ fn f25_the_wall_clock_has_no_effect_and_a_stop_is_stale_then_recovers() {
         // Compared as text, because a bound of NaN equals nothing.
         assert_eq!(format!("{expected:?}"), format!("{:?}", jumping.run(&[state]).expect("answered")));
     }
-    // Stopped for three seconds and continued: a full queue waits, its newest is fresh.
-    let waiting: Vec<RavenState> = (0..DEPTH_MAX).map(|_| jumping.next_state()).collect();
-    let pose = jumping.run(&waiting).expect("answered");
+    // Stopped for three seconds and continued: a full queue waits, its newest is fresh, and what it could not hold is lost.
+    let sent: Vec<RavenState> = (0..3000).map(|_| jumping.next_state()).collect();
+    let waiting = &sent[3000 - DEPTH_MAX..];
+    let pose = jumping.run(waiting).expect("answered");
     assert_eq!(pose.source_sequence, waiting[DEPTH_MAX - 1].sequence);
     assert_eq!(pose.skipped, DEPTH_MAX as u64 - 1);
+    assert_eq!(pose.lost, (3000 - DEPTH_MAX) as u64);
     assert_eq!(jumping.cycle.counters().published, 501, "one answer, not a burst");
 }
 

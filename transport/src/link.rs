@@ -201,7 +201,7 @@ pub struct Loan<T: Message> {
 
 impl<T: Message> Loan<T> {
     /// Brings the memory of the message to this core: readers had it last, and each line that comes from another core costs a tenth of a
-    /// microsecond while it is written.
+    /// microsecond while it is written. Whatever was written into it before is gone.
     pub fn touch(&mut self) {
         *self.sample.payload_mut() = MaybeUninit::zeroed();
     }
