@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-soak bench-offline worn model prove prove-small faults fuzz emulated lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-soak bench-offline worn model prove prove-small faults fuzz emulated chain lint clean
 
 all: build offline examples
 
@@ -80,6 +80,10 @@ test: offline examples venv
 faults: build
 	RAVENPOSE_KILLS=10000 $(CARGO) test $(CARGO_FLAGS) --workspace --test processes -- --nocapture fifty_kills
 	RAVENPOSE_FAULT_CYCLES=100000000 $(CARGO) test $(CARGO_FLAGS) --workspace --test faults -- --nocapture a_million_cycles
+
+# Simulation, images, tracking, pairs, the shipped model's error: some 3 minutes.
+chain: offline
+	tests/chain/run.sh $(BUILD)/chain
 
 # The kernels on processors that this machine is not: NEON under QEMU, AVX-512 with VNNI under Bochs. Root, 4 GB, an hour; EMULATED=neon or
 # avx512 for one of them.

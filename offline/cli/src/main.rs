@@ -111,6 +111,9 @@ enum Command {
         /// When the truth's time 0 is on the states' clock, to 5 s; otherwise their start times say it, or they begin together
         #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
         offset_s: Option<f64>,
+        /// That offset is exact, as where one wire or one clock triggers both: nothing of the clock is fitted to the motion
+        #[arg(long, conflicts_with = "same")]
+        clock_known: bool,
     },
     /// Where a simulation and recordings differ, which physics is missing, how large it is, and the model with it
     Gap {
@@ -248,7 +251,7 @@ fn main() -> ExitCode {
         }
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
-        Command::Pair { run, truth, out, cameras, register, same, offset_s } => pair::run(&pair::Wish {
+        Command::Pair { run, truth, out, cameras, register, same, offset_s, clock_known } => pair::run(&pair::Wish {
             run: &run,
             truth: truth.as_deref(),
             out: &out,
@@ -256,6 +259,7 @@ fn main() -> ExitCode {
             register: register.as_deref(),
             same,
             offset_s,
+            clock_known,
         }),
         Command::Gap { real, sim, robot, out, seed, trace, watch, seconds } => {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch, seconds })

@@ -6,7 +6,7 @@ use crate::{output, plot, registration};
 use arm::Side;
 use recordings::Recording;
 use recordings::open::{Opened, open};
-use recordings::pairs::{ClockChoice, Options, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
+use recordings::pairs::{Clock, ClockChoice, Options, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
 use recordings::save::{self, StateFormat};
 use recordings::stream::{self, Record};
 use std::fmt::Write as _;
@@ -29,6 +29,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) same: bool,
     /// What is known of the clocks' offset; otherwise the two recordings' own start times, otherwise that they begin together.
     pub(crate) offset_s: Option<f64>,
+    /// That offset is exact.
+    pub(crate) clock_known: bool,
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
@@ -60,7 +62,11 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         if let Some(found) = offset_s.or_else(stated) {
             *expected_offset_s = found;
             let source = if offset_s.is_some() { "as told" } else { "by the start times of both" };
-            say!("the truth's time 0 is at {found:.3} s of the states, {source}; searched {window_s} s to both sides");
+            let how = if wish.clock_known { "taken as exact".to_owned() } else { format!("searched {window_s} s to both sides") };
+            say!("the truth's time 0 is at {found:.3} s of the states, {source}; {how}");
+        }
+        if wish.clock_known {
+            options.clock = ClockChoice::Known(Clock { offset_s: *expected_offset_s, ..Clock::IDENTITY });
         }
     }
     let paired = pair(&reported, &frames, &options).map_err(|error| format!("{}: {error}", run.display()))?;

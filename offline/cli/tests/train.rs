@@ -202,6 +202,16 @@ fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
     assert!(rows > 300 && expected > 1.0, "{rows} {expected}");
     // But for frames at standstill, which are left out, and for what of a lag the fitted clock takes.
     assert!((found / expected - 1.0).abs() < 0.05, "{found} {expected}");
+    // With the clock known as well nothing of the arm's own lag is taken for one.
+    let exact = folder.file("exact.mcap");
+    let truth = seen_by_cameras(text(&runs[0]), &folder);
+    let clock = ["--clock-known", "--offset-s", "0.4"];
+    good(&ravenpose(
+        &[&["pair", text(&runs[0]), "--truth", text(&truth), "--cameras", text(&known), "--out", text(&exact)], &clock[..]]
+            .concat(),
+    ));
+    let ((rows, found), (_, expected)) = (labels(std::slice::from_ref(&exact)), labels(&runs[..1]));
+    assert!(rows > 100 && (found / expected - 1.0).abs() < 0.01, "{rows}: {found} {expected}");
     let (model, seen) = (folder.file("model.onnx"), seen.iter().map(|file| text(file)).collect::<Vec<_>>());
     good(&ravenpose(&[&["train", "--epochs", "2", "--out", text(&model), "--data"][..], &seen].concat()));
 
