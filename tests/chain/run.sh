@@ -8,25 +8,16 @@ work=$(realpath -m "$1")
 seconds=${2:-20}
 scene=${3:-hard}
 ravenpose=$PWD/target/release/ravenpose
-model=$PWD/models/raven2-worn.onnx
+models=$PWD/models
+model=$models/raven2-worn.onnx
 rm -rf "$work"
 mkdir -p "$work"
 cd "$work"
 
 minutes=$(python3 -c "print(($seconds + 10) / 60)")
 "$ravenpose" simulate --minutes "$minutes" --run-minutes "$minutes" --seed 77 --homing-seed 1 --robot raven2-worn --out runs > simulate.txt
-"$ravenpose" convert runs/run_0001.mcap run.mcap --from 0 --to "$seconds" > convert.txt
-"$ravenpose" vision render run.mcap --out scene --scene "$scene" --seed 5 --seconds "$seconds" > render.txt
-"$ravenpose" vision calibrate scene --out cameras.toml
-"$ravenpose" vision track scene --cameras cameras.toml --out truth.csv > track.txt 2>&1
-# A lab measures the frame once, with markers on the base; the renderer knows it.
-python3 - << 'PYTHON'
-import json
-frame = json.load(open("scene/registration_true.json"))["world_to_frame_0"]
-with open("cameras.toml", "a") as file:
-    file.write(f"\n[registration]\nrotation = {frame['rotation']}\ntranslation_mm = {frame['translation_mm']}\n")
-PYTHON
-"$ravenpose" pair run.mcap --truth truth.csv --cameras cameras.toml --clock-known --out seen.mcap > pair.txt
+"$models/see.sh" runs/run_0001.mcap "$seconds" "$scene" seen seen.mcap
+mv seen/run.mcap run.mcap
 
 for run in seen run; do
   "$ravenpose" evaluate --alone --model "$model" --data $run.mcap --out "report-$run" > "$run.txt"

@@ -52,9 +52,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
             wish.sim.len()
         ));
     }
-    if let Some(file) = wish.out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
-        return Err(format!("{}: is a file; give a folder with --out", file.display()));
-    }
+    output::check_folder(wish.out)?;
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
     let mut given = Vec::new();
     for (k, path) in wish.real.iter().enumerate() {

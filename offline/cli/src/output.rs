@@ -23,6 +23,14 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
     written
 }
 
+/// Can a folder be made there, or is it one? Asked before the work whose results it is for.
+pub(crate) fn check_folder(out: &Path) -> Result<(), String> {
+    match out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
+        Some(file) => Err(format!("{}: is a file; give a folder with --out", file.display())),
+        None => Ok(()),
+    }
+}
+
 /// Says a line on standard output; see [`say`].
 macro_rules! say {
     ($($told:tt)*) => {{

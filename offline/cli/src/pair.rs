@@ -71,7 +71,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     }
     let paired = pair(&reported, &frames, &options).map_err(|error| format!("{}: {error}", run.display()))?;
     if let Some(format) = format {
-        recording_with_truth(run, &paired, out, format)?;
+        recording_with_truth(run, &paired, !wish.same, out, format)?;
     } else {
         let text = table(&paired, &recording);
         output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
@@ -90,7 +90,13 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
 
 /// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that
 /// the recording held for that arm is left out.
-fn recording_with_truth(run: &Path, paired: &recordings::pairs::Paired, out: &Path, format: StateFormat) -> Result<(), String> {
+fn recording_with_truth(
+    run: &Path,
+    paired: &recordings::pairs::Paired,
+    measured: bool,
+    out: &Path,
+    format: StateFormat,
+) -> Result<(), String> {
     let Opened::States(mut source) = open(run).map_err(|error| error.to_string())? else {
         let remedy = "name the output .csv for the table of pairs, or convert the run to .mcap first";
         return Err(format!(
@@ -99,7 +105,12 @@ fn recording_with_truth(run: &Path, paired: &recordings::pairs::Paired, out: &Pa
             out.display()
         ));
     };
-    let metadata = source.metadata().to_vec();
+    let mut metadata = source.metadata().to_vec();
+    let (key, value) = stream::TRUTH_MEASURED;
+    metadata.retain(|(other, _)| other != key);
+    if measured {
+        metadata.push((key.to_owned(), value.to_owned()));
+    }
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
     let mut pairs = paired.pairs.iter().peekable();
     let mut start_ns = None;
@@ -112,8 +123,11 @@ fn recording_with_truth(run: &Path, paired: &recordings::pairs::Paired, out: &Pa
                 side = if state.connected() == 2 { Side::Green } else { Side::Gold };
                 let at_ns = |time_s: f64| start_ns + (time_s * 1e9).round() as i64;
                 while let Some(pair) = pairs.next_if(|pair| at_ns(pair.state_time_s) < time_ns) {
-                    let truth =
-                        stream::Truth { position_m: pair.truth_m, ..stream::Truth::unknown(at_ns(pair.state_time_s), side) };
+                    let truth = stream::Truth {
+                        position_m: pair.truth_m,
+                        quaternion_wxyz: pair.truth_wxyz.unwrap_or([f64::NAN; 4]),
+                        ..stream::Truth::unknown(at_ns(pair.state_time_s), side)
+                    };
                     sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
                 }
             }

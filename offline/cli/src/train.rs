@@ -1,8 +1,9 @@
 //! `ravenpose train`: from recordings with truth to a model file.
 
+use crate::convert::same_file;
 use crate::output;
 use ::training::commands::{self, Done, Event};
-use ::training::data::{Columns, Reading};
+use ::training::data::{Columns, Reading, Target};
 use ::training::preset::{First, Recipe};
 use arm::Side;
 use clap::Args;
@@ -44,12 +45,16 @@ pub(crate) struct Source {
     /// At most so many rows per second of truth
     #[arg(long, default_value_t = 30.0)]
     truth_hz: f64,
-    /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, mm
+    /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, in the unit of what is learnt (mm); a truth that was
+    /// measured, as `ravenpose pair` notes it, is given none
     #[arg(long, default_value_t = 0.0)]
     truth_noise: f64,
     /// Arm of a RAVEN-II, gold or green
     #[arg(long, default_value = "gold", value_parser = side)]
     arm: Side,
+    /// What of the tip is learnt; the service corrects positions alone
+    #[arg(long, default_value = "position", value_parser = Target::NAMES, conflicts_with = "inputs")]
+    target: String,
     #[command(flatten)]
     columns: Named,
 }
@@ -72,10 +77,11 @@ impl Source {
         }
         Ok(Reading {
             truth_hz: self.truth_hz,
-            truth_noise_mm: self.truth_noise,
+            truth_noise: self.truth_noise,
             seed: recipe.seed,
             plays: recipe.plays(),
             arm: self.arm,
+            target: Target::of_name(&self.target).unwrap_or_default(),
             columns: self.columns.columns(),
         })
     }
@@ -133,6 +139,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         Some(file) => format!("{}: {wrong}; give the best.json of `ravenpose search`", file.display()),
         None => format!("--preset {}: {wrong}", wish.preset),
     })?;
+    if wish.source.data.iter().any(|input| same_file(input, &wish.out)) {
+        return Err(format!("{}: is both input and output; choose another output", wish.out.display()));
+    }
     let reading = wish.source.reading(&recipe)?;
     let wanted = commands::Wish { data: &wish.source.data, reading: &reading, recipe: &recipe, out: &wish.out };
     let terminal = std::io::stderr().is_terminal();

@@ -213,7 +213,13 @@ fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
     let ((rows, found), (_, expected)) = (labels(std::slice::from_ref(&exact)), labels(&runs[..1]));
     assert!(rows > 100 && (found / expected - 1.0).abs() < 0.01, "{rows}: {found} {expected}");
     let (model, seen) = (folder.file("model.onnx"), seen.iter().map(|file| text(file)).collect::<Vec<_>>());
-    good(&ravenpose(&[&["train", "--epochs", "2", "--out", text(&model), "--data"][..], &seen].concat()));
+    let options = ["train", "--epochs", "2", "--truth-noise", "0.5", "--out", text(&model), "--data"];
+    let done = ravenpose(&[&options[..], &seen].concat());
+    good(&done);
+    // What cameras measured is noisy enough.
+    assert_eq!(String::from_utf8_lossy(&done.stderr).matches("its truth was measured: no noise is added").count(), 4);
+    let card = training::commands::Model::read(&model).expect("model").card;
+    assert!(card["ravenpose.trained_on"].contains("whose truth was measured"), "{}", card["ravenpose.trained_on"]);
 
     // What cannot be written is one line, and nothing is left.
     let table = folder.file("run.csv");

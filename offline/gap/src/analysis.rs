@@ -303,7 +303,7 @@ fn analyse_with(
         quality.insert(0, too_few(seen_s));
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
-    fits(&train, robot.joint_count(), options.free_bytes)?;
+    fits(&train, train_s, robot.joint_count(), options.free_bytes)?;
     progress("learning what the simulator believes");
     let apart: Vec<Motion> = apart.into_iter().map(|sim| Motion::new(sim, band)).collect();
     let sims: Vec<&Motion> = train.iter().chain(&held).filter_map(|pair| pair.sim.as_ref()).chain(&apart).collect();
@@ -447,14 +447,13 @@ fn beyond_recording(problem: &Problem, answer: &Answer, ceiling: &flexible::Ceil
 }
 
 /// Refuses what the library of explanations would fill more memory for than there is.
-fn fits(train: &[Pair], joints: usize, free_bytes: fn() -> Option<u64>) -> Result<(), AnalysisError> {
+fn fits(train: &[Pair], train_s: f64, joints: usize, free_bytes: fn() -> Option<u64>) -> Result<(), AnalysisError> {
     let rows: usize = train.iter().map(|pair| pair.real.rows.len().max(pair.real.tip_rows.len())).sum();
     let needs = LIBRARY_BYTES * (rows * joints) as f64;
     let gib = |bytes: f64| bytes / f64::from(1 << 30);
     match free_bytes() {
         Some(free) if needs > free as f64 => {
-            let seconds: f64 = train.iter().map(|pair| pair.real.run.len() as f64 * pair.real.run.dt_s).sum();
-            Err(AnalysisError::Memory { minutes: seconds / 60.0, needs_gib: gib(needs), free_gib: gib(free as f64) })
+            Err(AnalysisError::Memory { minutes: train_s / 60.0, needs_gib: gib(needs), free_gib: gib(free as f64) })
         }
         _ => Ok(()),
     }

@@ -25,6 +25,14 @@ impl Record {
     }
 }
 
+/// Metadata of a recording whose truth was measured, not simulated.
+pub const TRUTH_MEASURED: (&str, &str) = ("truth", "measured");
+
+/// Was the truth of a recording with such metadata measured? False where it does not say.
+pub fn is_truth_measured(metadata: &[(String, String)]) -> bool {
+    metadata.iter().any(|(key, value)| (key.as_str(), value.as_str()) == TRUTH_MEASURED)
+}
+
 /// Where an arm really was, as far as a tracker, joint encoders or a simulator know it. What is not known is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {

@@ -265,6 +265,10 @@ fn orientation_labels_leave_the_mounting_out() {
         let expected = error(pair.state_time_s).scaled_axis();
         let found = Vector3::from(pair.rotation_label_rad.expect("label"));
         worst = worst.max((found - expected).norm());
+        let [w, x, y, z] = pair.truth_wxyz.expect("orientation");
+        let truth = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let exact = error(pair.state_time_s) * arm(pair.state_time_s);
+        assert!(truth.angle_to(&exact) < 0.006, "{}", truth.angle_to(&exact));
     }
     println!(
         "orientation labels are off by {:.3} deg at most, RMS label {:.2} deg",

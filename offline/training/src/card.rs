@@ -1,16 +1,17 @@
 //! The model card as metadata: what a network may be used for, in the form that `docs/models.md` lays down.
 
 use crate::chain::Chain;
-use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
+use crate::data::{Target, Trajectory};
 use crate::prepare::Prepared;
+use ravenpose::card::UNITS;
 use ravenpose::load::LoadCard;
 use ravenpose_wire::{FEATURES, PEDAL_DOWN, features};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// Units that the service asks for.
-const UNITS: &str = "raven_state as published; position error in mm";
+/// Units of a model of the orientation: others than the service asks for, whose message passes the reported orientation through.
+const UNITS_OF_ORIENTATION: &str = "raven_state as published; orientation error in deg";
 /// Property: RMS of the vector that is left on the validation trajectories, without the truth's known noise; for `evaluate`.
 pub const VALIDATION_RMS: &str = "ravenpose.validation_rms";
 /// Coverage that the bound is stated for.
@@ -41,6 +42,8 @@ pub struct Facts<'a> {
     /// Are the inputs `raven118-v1`, perhaps with a memory behind them? The card speaks of the layout's 118 only: what a memory
     /// adds is bounded by itself.
     pub is_raven: bool,
+    /// What of a RAVEN-II's tip it gives.
+    pub target: Target,
     /// What it looks at.
     pub prepared: &'a Prepared,
     /// What torque tells about the load, if it does.
@@ -51,8 +54,6 @@ pub struct Facts<'a> {
     pub validation: &'a [Trajectory],
     /// In words: data, split, recipe.
     pub trained_on: &'a str,
-    /// Known noise of the truth, 3D, mm; 0 where it is not known, which makes the bound wider than need be.
-    pub truth_noise_mm: f64,
     /// Further properties.
     pub more: BTreeMap<String, String>,
 }
@@ -61,20 +62,19 @@ pub struct Facts<'a> {
 /// split conformal prediction does: whole trajectories, since what differs from run to run is not in the rows of one. The gradient never
 /// saw them, but the epoch was chosen by them. Of fewer than three it is the widest. Rows whose memory had not settled have a bound of
 /// their own, and count only where no other is there. NaN where there are no rows.
-pub fn bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64) -> Vec<f64> {
+pub fn bounds(chain: &Chain, validation: &[Trajectory]) -> Vec<f64> {
     let outputs = chain.outputs();
-    let noise = truth_noise / (outputs.max(1) as f64).sqrt();
-    let is_settled = |one: &Trajectory| (0..one.rows()).map(|row| one.is_settled(row)).collect::<Vec<_>>();
-    let none_is = !validation.iter().flat_map(is_settled).any(|settled| settled);
+    let per_axis = 1.0 / (outputs.max(1) as f64).sqrt();
+    let any_settled = validation.iter().any(|one| (0..one.rows()).any(|row| one.is_settled(row)));
     let estimates: Vec<Vec<f32>> = validation.iter().map(|one| chain.estimate(&one.inputs)).collect();
     let runs = || validation.iter().zip(&estimates).filter(|(one, _)| one.rows() > 0);
     (0..outputs)
         .map(|output| {
             let of_run = |(one, estimates): (&Trajectory, &Vec<f32>)| {
                 let rests = one.labels.iter().zip(estimates).skip(output).step_by(outputs);
-                let counted = rests.zip(is_settled(one)).filter(|(_, settled)| *settled || none_is);
-                let rests: Vec<f64> = counted.map(|((label, estimate), _)| f64::from(label - estimate).abs()).collect();
-                (!rests.is_empty()).then(|| half_width(rests, noise))
+                let counted = rests.enumerate().filter(|(row, _)| !any_settled || one.is_settled(*row));
+                let rests: Vec<f64> = counted.map(|(_, (label, estimate))| f64::from(label - estimate).abs()).collect();
+                (!rests.is_empty()).then(|| half_width(rests, one.noise * per_axis))
             };
             let mut all: Vec<f64> = runs().filter_map(of_run).collect();
             all.sort_by(f64::total_cmp);
@@ -101,9 +101,8 @@ fn half_width(mut lengths: Vec<f64>, noise: f64) -> f64 {
 
 /// The same while a memory has not settled: the widest over its ages, and no narrower than `settled`, that of one that has. None where
 /// no memory was unsettled.
-fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], truth_noise: f64, settled: &[f64]) -> Option<Vec<f64>> {
-    let of_age =
-        |age_s| bounds(chain, &validation.iter().map(|one: &Trajectory| one.unsettled(age_s)).collect::<Vec<_>>(), truth_noise);
+fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], settled: &[f64]) -> Option<Vec<f64>> {
+    let of_age = |age_s| bounds(chain, &validation.iter().map(|one: &Trajectory| one.unsettled(age_s)).collect::<Vec<_>>());
     let ages: Vec<Vec<f64>> = AGES_S.iter().map(of_age).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())).collect();
     let wider = |widest: Vec<f64>, bounds: &Vec<f64>| widest.iter().zip(bounds).map(|(a, b)| a.max(*b)).collect();
     (!ages.is_empty()).then(|| ages.iter().fold(settled.to_vec(), wider))
@@ -121,17 +120,21 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
     let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
     let is_raven = facts.is_raven;
-    let settled = bounds(facts.chain, facts.validation, facts.truth_noise_mm);
+    let settled = bounds(facts.chain, facts.validation);
     put("trained_on", facts.trained_on.to_owned());
     if is_raven {
         put("feature_layout", features::LAYOUT.to_owned());
-        put("units", UNITS.to_owned());
+        let units = match facts.target {
+            Target::Position => UNITS,
+            Target::Orientation => UNITS_OF_ORIENTATION,
+        };
+        put("units", units.to_owned());
         put("runlevels", PEDAL_DOWN.to_string());
         let boards: BTreeSet<i32> = facts.train.iter().chain(facts.validation).map(|one| one.board).collect();
         if !boards.contains(&0) {
             put("boards", words(&boards.into_iter().collect::<Vec<_>>()));
         }
-        if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, facts.truth_noise_mm, &settled) {
+        if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, &settled) {
             put("bound95_unsettled_mm", words(&wider));
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
@@ -170,11 +173,11 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
 fn validation_rms(facts: &Facts) -> f64 {
     let squares = |one: &Trajectory| {
         let rests = one.labels.iter().zip(facts.chain.estimate(&one.inputs)).map(|(label, estimate)| f64::from(label - estimate));
-        rests.map(|rest| rest * rest).sum::<f64>()
+        rests.map(|rest| rest * rest).sum::<f64>() - one.rows() as f64 * one.noise * one.noise
     };
     let rows: usize = facts.validation.iter().map(Trajectory::rows).sum();
     let mean = facts.validation.iter().map(squares).sum::<f64>() / rows as f64;
-    (mean - facts.truth_noise_mm * facts.truth_noise_mm).max(0.0).sqrt()
+    mean.max(0.0).sqrt()
 }
 
 fn words<T: std::fmt::Display>(numbers: &[T]) -> String {
@@ -203,6 +206,11 @@ fn ranges(facts: &Facts, is_raven: bool) -> (Vec<f32>, Vec<f32>) {
     (low, high)
 }
 
+/// How far a row is from what was trained on.
+pub(crate) fn distance(row: &[f32], center: &[f32], weight: &[f32]) -> f64 {
+    row.iter().zip(center).zip(weight).map(|((x, c), w)| f64::from((x - c) * w).powi(2)).sum::<f64>().sqrt()
+}
+
 /// Centre, weights and limit of the distance: standardised inputs that the network looks at.
 fn domain(facts: &Facts) -> (Vec<f32>, Vec<f32>, f32) {
     let inputs = facts.chain.inputs();
@@ -213,10 +221,8 @@ fn domain(facts: &Facts) -> (Vec<f32>, Vec<f32>, f32) {
             if counts { facts.chain.scale[input] } else { 0.0 }
         })
         .collect();
-    let distance =
-        |row: &[f32]| row.iter().zip(&center).zip(&weight).map(|((x, c), w)| f64::from((x - c) * w).powi(2)).sum::<f64>().sqrt();
     let rows = facts.validation.iter().flat_map(|one| one.inputs.chunks_exact(inputs.max(1)));
-    let mut distances: Vec<f64> = rows.map(distance).collect();
+    let mut distances: Vec<f64> = rows.map(|row| distance(row, &center, &weight)).collect();
     let limit = (DOMAIN_ROOM * quantile(&mut distances, DOMAIN_SHARE)).max(f64::from(f32::MIN_POSITIVE));
     (center, weight, limit as f32)
 }
@@ -262,7 +268,7 @@ mod tests {
             let mut one =
                 Trajectory { time_s: vec![0.0; n], inputs: vec![0.0; n], labels: exact.clone(), exact, ..Trajectory::default() };
             crate::data::add_noise(&mut one, 3, noise, &mut random);
-            let bounds = bounds(&chain_of_nothing(3), std::slice::from_ref(&one), noise);
+            let bounds = bounds(&chain_of_nothing(3), std::slice::from_ref(&one));
             for (output, bound) in bounds.iter().enumerate() {
                 let inside = one.exact.iter().skip(output).step_by(3).filter(|value| f64::from(value.abs()) <= *bound).count();
                 let share = inside as f64 / n as f64;
@@ -280,9 +286,9 @@ mod tests {
             let (inputs, young_places) = (vec![0.0; 100], vec![0.0; 100]);
             Trajectory { time_s, inputs, young_places, labels, settled_after_s: Some(30.0), ..Trajectory::default() }
         };
-        assert_eq!(bounds(&chain_of_nothing(1), &[of(1.0)], 0.0), [1.0]);
-        assert_eq!(bounds(&chain_of_nothing(1), &[of(2.0), of(1.0)], 0.0), [2.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[of(1.0)]), [1.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[of(2.0), of(1.0)]), [2.0]);
         let never = Trajectory { settled_after_s: None, ..of(1.0) };
-        assert_eq!(bounds(&chain_of_nothing(1), &[never], 0.0), [5.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[never]), [5.0]);
     }
 }

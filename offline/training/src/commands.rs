@@ -17,6 +17,10 @@ use std::path::{Path, PathBuf};
 /// One row of training in so many has a memory that began a few seconds before.
 pub(crate) const YOUNG_EVERY: usize = 8;
 
+/// Properties of the card: noise that was added to the truth, in the outputs' unit, and what of a RAVEN-II's tip the model gives.
+pub(crate) const TRUTH_NOISE: &str = "ravenpose.truth_noise_mm";
+pub(crate) const TARGET: &str = "ravenpose.target";
+
 /// What is to be trained.
 #[derive(Debug, Clone)]
 pub struct Wish<'a> {
@@ -69,7 +73,7 @@ pub struct Done {
 /// # Errors
 /// [`TrainingError`]: data, checkpoint, or files that cannot be written.
 pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
-    check_out(wish.out, wish.data)?;
+    check_out(wish.out)?;
     let (mut set, mut parts) =
         read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
     let count = |part: &[Trajectory]| part.iter().map(Trajectory::rows).sum();
@@ -78,9 +82,9 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     parts.train.iter_mut().for_each(|one| one.make_young(YOUNG_EVERY));
     let checkpoint = beside(wish.out, "checkpoint");
     let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
-    let trained = train::train(&parts.train, &parts.validation, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
+    let trained = train::train(&parts, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
     let chain = Chain::of(&trained, &wish.reading.plays);
-    let (epoch, validation_rms) = trained.best().map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
+    let (epoch, validation_rms) = train::best(&trained.curves).map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
     let mut notes = std::mem::take(&mut set.notes);
     let load = if set.is_raven {
         let arm = Raven2::nominal().arm(wish.reading.arm);
@@ -93,16 +97,16 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let facts = Facts {
         chain: &chain,
         is_raven: set.is_raven,
+        target: wish.reading.target,
         load: load.as_ref(),
         prepared: &trained.prepared,
         train: &parts.train,
         validation: &parts.validation,
-        trained_on: &trained_on(wish, rows, trajectories, &set),
-        truth_noise_mm: wish.reading.truth_noise_mm,
+        trained_on: &trained_on(wish, rows, &parts, &set),
         more: more(wish, &parts, &set),
     };
     let card = card::card(&facts);
-    let unit = if set.is_raven { "mm" } else { "units of the truth" };
+    let unit = set.unit();
     write_model(wish.out, &chain, &card)?;
     write_whole(&beside(wish.out, "curves.svg"), figures::curves_svg(&trained.curves, unit).as_bytes())?;
     drop(fs::remove_file(&checkpoint));
@@ -112,7 +116,7 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
         validation_rms,
         epoch,
         has_line: trained.has_line,
-        bounds: card::bounds(&chain, &parts.validation, wish.reading.truth_noise_mm),
+        bounds: card::bounds(&chain, &parts.validation),
         seconds: trained.seconds,
         weights: chain.layers.iter().map(|layer| layer.weight.len() + layer.bias.len()).sum(),
         notes,
@@ -120,16 +124,13 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     })
 }
 
-/// Can a file be written there in the end, and is it none of those that are read?
-fn check_out(out: &Path, data: &[PathBuf]) -> Result<(), TrainingError> {
+/// Can a file be written there in the end?
+fn check_out(out: &Path) -> Result<(), TrainingError> {
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let same = |file: &PathBuf| out.canonicalize().is_ok_and(|out| file.canonicalize().is_ok_and(|file| file == out));
     let what = if out.is_dir() {
         "is a folder"
     } else if !folder.is_dir() {
         "lies in no folder"
-    } else if data.iter().any(same) {
-        "is one of the recordings"
     } else {
         return Ok(());
     };
@@ -176,21 +177,32 @@ fn beside(model: &Path, extension: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn trained_on(wish: &Wish, rows: [usize; 3], trajectories: [usize; 3], set: &DataSet) -> String {
+fn trained_on(wish: &Wish, rows: [usize; 3], parts: &Parts, set: &DataSet) -> String {
     let minutes = |rows: usize| rows as f64 / wish.reading.truth_hz / 60.0;
     let kind = if set.is_raven { "RAVEN-II recordings" } else { "tables" };
+    let [train, validation, test] = [parts.train.len(), parts.validation.len(), parts.test.names().len()];
+    let measured: Vec<&Trajectory> = parts.train.iter().filter(|one| one.is_measured).collect();
+    let measured = match measured.as_slice() {
+        [] => String::new(),
+        some => {
+            let rows = some.iter().map(|one| one.rows()).sum();
+            format!(
+                ", none to {} of the {train} that it learnt from ({:.1} minutes), whose truth was measured",
+                some.len(),
+                minutes(rows)
+            )
+        }
+    };
     format!(
-        "{} {kind}, {:.1} minutes of truth at {} Hz, whole trajectories split {}/{}/{} (training/validation/test); learnt from {} rows \
-         ({:.1} minutes); truth noise {} mm added; preset {}, seed {}",
-        trajectories.iter().sum::<usize>(),
+        "{} {kind}, {:.1} minutes of truth at {} Hz, whole trajectories split {train}/{validation}/{test} (training/validation/test); learnt \
+         from {} rows ({:.1} minutes); truth noise {} {} added{measured}; preset {}, seed {}",
+        train + validation + test,
         minutes(rows.iter().sum()),
         wish.reading.truth_hz,
-        trajectories[0],
-        trajectories[1],
-        trajectories[2],
         rows[0],
         minutes(rows[0]),
-        wish.reading.truth_noise_mm,
+        wish.reading.truth_noise,
+        set.unit(),
         wish.recipe.name,
         wish.recipe.seed
     )
@@ -207,8 +219,9 @@ fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
         ("ravenpose.train_sketches".to_owned(), sketches(&parts.train)),
         ("ravenpose.validation_sketches".to_owned(), sketches(&parts.validation)),
         ("ravenpose.truth_hz".to_owned(), wish.reading.truth_hz.to_string()),
-        ("ravenpose.truth_noise_mm".to_owned(), wish.reading.truth_noise_mm.to_string()),
+        (TRUTH_NOISE.to_owned(), wish.reading.truth_noise.to_string()),
         ("ravenpose.recipe".to_owned(), recipe),
+        (TARGET.to_owned(), wish.reading.target.name().to_owned()),
     ]);
     if !set.is_raven {
         more.insert("ravenpose.inputs".to_owned(), set.input_names.join(" "));

@@ -1,6 +1,6 @@
 //! Pictures of training.
 
-use crate::train::Point;
+use crate::train::{Point, best};
 use plot::figure::{Axis, Colour, Figure, Mark, Panel, svg_document};
 
 /// Learning curves as a figure; 3D RMS of what is left, in the labels' unit.
@@ -11,8 +11,7 @@ pub fn curves(points: &[Point], unit: &str) -> Figure {
     let panel = Panel::new(Axis::new(format!("RMS left, {unit}")))
         .mark(line("training", Colour::BLUE, |point| point.train_rms))
         .mark(line("validation", Colour::ORANGE, |point| point.validation_rms));
-    let best = points.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
-    let caption = best.map_or_else(String::new, |best| {
+    let caption = best(points).map_or_else(String::new, |best| {
         format!("Least on validation: {:.3} {unit} in epoch {}; that network is kept.", best.validation_rms, best.epoch)
     });
     Figure::new("Learning curves", Axis::new("Epoch")).panel(panel).caption(caption)

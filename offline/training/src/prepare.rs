@@ -73,7 +73,6 @@ impl Prepared {
             // What is appended to the layout is memory, each a feature of its own.
             Preparation::Physical => physical().into_iter().chain((FEATURES..inputs).map(|input| vec![(input, 1.0)])).collect(),
         };
-        debug_assert!(sums.iter().flatten().all(|(input, _)| *input < inputs), "Physical is for raven118-v1");
         let raw: Vec<Vec<(usize, f64)>> = (0..inputs).map(|input| vec![(input, 1.0)]).collect();
         let (mut mean, mut sd) = statistics(trajectories, inputs, &raw);
         // The exported normalisation works in float32; the folded bias has to make up for just that.

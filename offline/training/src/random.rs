@@ -3,6 +3,16 @@
 
 use serde::{Deserialize, Serialize};
 
+/// What SplitMix64 steps by.
+pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// SplitMix64's mixing: every bit of the result depends on every bit (Steele, Lea and Flood 2014).
+pub(crate) fn mixed(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
 /// A stream of random numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Random {
@@ -15,11 +25,8 @@ impl Random {
         let mut z = seed ^ purpose.wrapping_mul(0xd134_2543_de82_ef95);
         // SplitMix64, as the authors of the generator recommend for its state.
         let state = std::array::from_fn(|_| {
-            z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut x = z;
-            x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            x ^ (x >> 31)
+            z = z.wrapping_add(GOLDEN);
+            mixed(z)
         });
         Self { state }
     }

@@ -2,7 +2,7 @@
 //! Talwalkar 2016, by thirds). Every finished training is a line of `trials.jsonl`, from which a stopped search goes on.
 
 use crate::commands::{YOUNG_EVERY, read_parts, write_whole};
-use crate::data::{Reading, Trajectory};
+use crate::data::Reading;
 use crate::error::{TrainingError, hex, shown};
 use crate::network::{Activation, NormPlace};
 use crate::prepare::Preparation;
@@ -117,17 +117,17 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
 /// # Errors
 /// [`TrainingError`]: data, a folder that cannot be written or holds another search.
 pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Trial>, TrainingError> {
-    let (set, Parts { mut train, mut validation, .. }) = read_parts(wish.data, wish.reading, wish.base.seed, &mut |_, _| {})?;
+    let (set, mut parts) = read_parts(wish.data, wish.reading, wish.base.seed, &mut |_, _| {})?;
     let outputs = set.outputs();
-    for one in train.iter_mut().chain(&mut validation) {
+    for one in parts.train.iter_mut().chain(&mut parts.validation) {
         one.thin(wish.every);
     }
-    for one in &mut train {
+    for one in &mut parts.train {
         one.make_young(YOUNG_EVERY);
     }
     let cannot = |error: std::io::Error| TrainingError::file(wish.out, format!("cannot be made: {error}"), "choose another --out");
     fs::create_dir_all(wish.out).map_err(cannot)?;
-    let mut file = Finished::open(&wish.out.join(TRIALS), &identity(wish, &train, &validation))?;
+    let mut file = Finished::open(&wish.out.join(TRIALS), &identity(wish, &parts))?;
     let all = rungs(wish.trials).iter().sum();
     let mut kept: Vec<usize> = (0..wish.trials).collect();
     let mut found: Vec<Trial> = Vec::new();
@@ -137,7 +137,7 @@ pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Tr
         for &index in &kept {
             let trial = match file.take(rung, index) {
                 Some(trial) => trial,
-                None => file.add(one(wish, rung, index, (&train, &validation, outputs))?)?,
+                None => file.add(one(wish, rung, index, &parts, outputs)?)?,
             };
             told(&trial, all);
             here.push(trial);
@@ -153,12 +153,12 @@ pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Tr
     Ok(found)
 }
 
-fn one(wish: &Wish, rung: usize, index: usize, data: (&[Trajectory], &[Trajectory], usize)) -> Result<Trial, TrainingError> {
+fn one(wish: &Wish, rung: usize, index: usize, parts: &Parts, outputs: usize) -> Result<Trial, TrainingError> {
     let mut recipe = draw(wish.base, index);
     recipe.epochs = wish.epochs * KEPT.pow(rung as u32);
     let begun = std::time::Instant::now();
-    let validation_rms = match train::train(data.0, data.1, data.2, &recipe, None, &mut |_| {}) {
-        Ok(trained) => trained.best().map(|best| best.validation_rms),
+    let validation_rms = match train::train(parts, outputs, &recipe, None, &mut |_| {}) {
+        Ok(trained) => train::best(&trained.curves).map(|best| best.validation_rms),
         Err(TrainingError::Diverged { .. }) => None,
         Err(error) => return Err(error),
     };
@@ -166,10 +166,10 @@ fn one(wish: &Wish, rung: usize, index: usize, data: (&[Trajectory], &[Trajector
 }
 
 /// Of everything that a finished training depends on.
-fn identity(wish: &Wish, train: &[Trajectory], validation: &[Trajectory]) -> String {
+fn identity(wish: &Wish, parts: &Parts) -> String {
     let mut hash = Sha256::new();
     hash.update(format!("{:?} {} {} {}", wish.base, wish.trials, wish.epochs, wish.every));
-    for one in train.iter().chain(validation) {
+    for one in parts.train.iter().chain(&parts.validation) {
         hash.update(format!("{}:{}:{}", one.id(), one.rows(), one.inputs.len()));
         one.labels.iter().for_each(|number| hash.update(number.to_le_bytes()));
     }

@@ -55,6 +55,8 @@ pub struct Pair {
     /// Rotation vector that turns the reported orientation into the true one, rad, axes of frame 0; where both streams have
     /// orientations.
     pub rotation_label_rad: Option<[f64; 3]>,
+    /// True orientation of the end effector in frame 0, without the fixture's mounting: w, x, y, z; where both streams have one.
+    pub truth_wxyz: Option<[f64; 4]>,
 }
 
 /// Pairs, what became of every frame, and the report.

@@ -10,10 +10,19 @@ use super::{Reported, Truth};
 
 /// Labels of the pairs and the mounting.
 pub(super) struct Orientations {
-    /// Rotation vector from the reported to the true orientation, frame 0, rad; none where either is missing.
-    pub(super) labels_rad: Vec<Option<[f64; 3]>>,
+    /// Per pair; none where either orientation is missing.
+    pub(super) labels: Vec<Option<Label>>,
     /// Rotation of the fixture on the end effector: fixture axes in end-effector axes, rows.
     pub(super) mounting: [[f64; 3]; 3],
+}
+
+/// Of one pair.
+#[derive(Clone, Copy)]
+pub(super) struct Label {
+    /// Rotation vector from the reported to the true orientation, frame 0, rad.
+    pub(super) turn_rad: [f64; 3],
+    /// True orientation of the end effector in frame 0: w, x, y, z.
+    pub(super) truth_wxyz: [f64; 4],
 }
 
 /// None where a stream has no orientation, or no pair has both.
@@ -36,11 +45,13 @@ pub(super) fn labels(
         .collect();
     let relative: Vec<Rotation3<f64>> = both.iter().flatten().map(|(arm, camera)| arm.inverse() * camera).collect();
     let mounting = mean(&relative)?;
-    let label = |(arm, camera): (Rotation3<f64>, Rotation3<f64>)| -> [f64; 3] {
-        (camera * mounting.inverse() * arm.inverse()).scaled_axis().into()
+    let label = |(arm, camera): (Rotation3<f64>, Rotation3<f64>)| {
+        let truth = camera * mounting.inverse();
+        let q = UnitQuaternion::from_rotation_matrix(&truth);
+        Label { turn_rad: (truth * arm.inverse()).scaled_axis().into(), truth_wxyz: [q.w, q.i, q.j, q.k] }
     };
     let row = |row: usize| std::array::from_fn(|column| mounting.matrix()[(row, column)]);
-    Some(Orientations { labels_rad: both.into_iter().map(|pair| pair.map(label)).collect(), mounting: [row(0), row(1), row(2)] })
+    Some(Orientations { labels: both.into_iter().map(|pair| pair.map(label)).collect(), mounting: [row(0), row(1), row(2)] })
 }
 
 fn unit(wxyz: [f64; 4]) -> Option<UnitQuaternion<f64>> {

@@ -120,23 +120,26 @@ pub(super) fn paired(
 ) -> Paired {
     let rigid = aligned.fit.place.rigid();
     let turned = orientation::labels(reported, truth, &drops.kept, &rigid, options.gap_max_s);
-    let rotations = turned.as_ref().map(|turned| turned.labels_rad.as_slice());
     let pairs: Vec<Pair> = drops
         .kept
         .iter()
         .enumerate()
-        .map(|(i, one)| Pair {
-            frame: one.frame,
-            truth_time_s: truth.t_s[one.frame],
-            state_time_s: one.state_time_s,
-            reported_m: one.reported_m,
-            truth_m: one.truth_m,
-            label_m: one.label_m(),
-            rotation_label_rad: rotations.and_then(|rotations| rotations[i]),
+        .map(|(i, one)| {
+            let turned = turned.as_ref().and_then(|turned| turned.labels[i]);
+            Pair {
+                frame: one.frame,
+                truth_time_s: truth.t_s[one.frame],
+                state_time_s: one.state_time_s,
+                reported_m: one.reported_m,
+                truth_m: one.truth_m,
+                label_m: one.label_m(),
+                rotation_label_rad: turned.map(|turned| turned.turn_rad),
+                truth_wxyz: turned.map(|turned| turned.truth_wxyz),
+            }
         })
         .collect();
     let orientation = turned.as_ref().map(|turned| {
-        let angles: Vec<f64> = turned.labels_rad.iter().flatten().map(|label| length(*label)).collect();
+        let angles: Vec<f64> = turned.labels.iter().flatten().map(|label| length(label.turn_rad)).collect();
         let square = angles.iter().map(|angle| angle * angle).sum::<f64>();
         let rms_rad = (square / angles.len().max(1) as f64).sqrt();
         OrientationReport { pairs: angles.len(), mounting: turned.mounting, rms_rad }

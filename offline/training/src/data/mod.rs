@@ -36,6 +36,10 @@ pub struct Trajectory {
     pub young_places: Vec<f32>,
     /// Per row: how long before that memory began, s; NaN where it has settled since.
     pub unsettled_s: Vec<f64>,
+    /// Standard deviation in 3D of the noise that was added to `labels`, in their unit; 0 where none was.
+    pub noise: f64,
+    /// Does the recording say that its truth was measured, not simulated?
+    pub is_measured: bool,
     /// Number of the arm's board (`type` of its states); 0 where the file does not say.
     pub board: i32,
     /// Of all states, or all rows of a table with truth, read at whatever rate.
@@ -75,7 +79,7 @@ impl Trajectory {
     pub fn unsettled(&self, age_s: &Range<f64>) -> Self {
         let places = self.young_places.len() / self.rows().max(1);
         let (inputs, outputs) = (self.inputs.len() / self.rows().max(1), self.labels.len() / self.rows().max(1));
-        let mut found = Self { name: self.name.clone(), ..Self::default() };
+        let mut found = Self { name: self.name.clone(), noise: self.noise, ..Self::default() };
         if places == 0 {
             return found;
         }
@@ -129,7 +133,7 @@ pub struct DataSet {
     pub input_names: Vec<String>,
     /// Names of the outputs, with their unit.
     pub output_names: Vec<String>,
-    /// Are the inputs `raven118-v1` and the outputs the tip's error in mm?
+    /// Are the inputs `raven118-v1` and the outputs the tip's error?
     pub is_raven: bool,
     /// One per recording, in the order given.
     pub trajectories: Vec<Trajectory>,
@@ -148,9 +152,51 @@ impl DataSet {
         self.output_names.len()
     }
 
+    /// Unit of the outputs, in words.
+    pub fn unit(&self) -> &'static str {
+        match self.output_names.first() {
+            Some(name) if self.is_raven && name.ends_with("_deg") => "deg",
+            _ if self.is_raven => "mm",
+            _ => "units of the truth",
+        }
+    }
+
     /// Rows of all trajectories.
     pub fn rows(&self) -> usize {
         self.trajectories.iter().map(Trajectory::rows).sum()
+    }
+}
+
+/// What of a RAVEN-II's tip is learnt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Target {
+    /// True minus reported position, mm, frame 0.
+    #[default]
+    Position,
+    /// The turn from the reported to the true orientation as a rotation vector, degrees, frame 0.
+    Orientation,
+}
+
+impl Target {
+    /// Names on the command line.
+    pub const NAMES: [&str; 2] = ["position", "orientation"];
+
+    /// Of a name; none for another word.
+    pub fn of_name(name: &str) -> Option<Self> {
+        [Self::Position, Self::Orientation].into_iter().find(|target| target.name() == name)
+    }
+
+    /// Name on the command line and in the card.
+    pub const fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// Names of the three outputs, with their unit.
+    pub(crate) const fn outputs(self) -> [&'static str; 3] {
+        match self {
+            Self::Position => ["error_x_mm", "error_y_mm", "error_z_mm"],
+            Self::Orientation => ["turn_x_deg", "turn_y_deg", "turn_z_deg"],
+        }
     }
 }
 
@@ -159,21 +205,32 @@ impl DataSet {
 pub struct Reading {
     /// At most so many rows per second of truth.
     pub truth_hz: f64,
-    /// Standard deviation in 3D of the noise that is added to the truth, mm: for simulated runs, whose truth is exact.
-    pub truth_noise_mm: f64,
+    /// Standard deviation in 3D of the noise that is added to the truth, in the labels' unit: for simulated runs, whose truth is exact.
+    /// A recording that says that its truth was measured is given none.
+    pub truth_noise: f64,
     /// Seed of that noise.
     pub seed: u64,
     /// Memory of the recent motion that is appended to the inputs of a RAVEN-II.
     pub plays: Vec<Play>,
     /// Arm of a RAVEN-II.
     pub arm: Side,
+    /// What of its tip is learnt.
+    pub target: Target,
     /// Named columns instead of the state of a RAVEN-II.
     pub columns: Option<Columns>,
 }
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { truth_hz: 30.0, truth_noise_mm: 0.0, seed: 0, plays: Vec::new(), arm: Side::Gold, columns: None }
+        Self {
+            truth_hz: 30.0,
+            truth_noise: 0.0,
+            seed: 0,
+            plays: Vec::new(),
+            arm: Side::Gold,
+            target: Target::Position,
+            columns: None,
+        }
     }
 }
 
@@ -187,16 +244,18 @@ const NOISE: u64 = 11;
 pub fn read(files: &[PathBuf], reading: &Reading, seen: &mut dyn FnMut(usize, usize)) -> Result<DataSet, TrainingError> {
     let mut data = match &reading.columns {
         Some(columns) => table::empty(columns),
-        None => raven::empty(&reading.plays),
+        None => raven::empty(reading.target, &reading.plays),
     };
     for (index, file) in files.iter().enumerate() {
         let mut trajectory = match &reading.columns {
             Some(columns) => table::read(file, columns, reading.truth_hz, &mut data.notes)?,
             None => raven::read(file, reading, &mut data.notes)?,
         };
-        if reading.truth_noise_mm > 0.0 {
+        if reading.truth_noise > 0.0 && trajectory.is_measured {
+            data.notes.push(format!("{}: its truth was measured: no noise is added", trajectory.name));
+        } else if reading.truth_noise > 0.0 {
             let mut random = Random::new(reading.seed.wrapping_add(index as u64), NOISE);
-            add_noise(&mut trajectory, data.output_names.len(), reading.truth_noise_mm, &mut random);
+            add_noise(&mut trajectory, data.output_names.len(), reading.truth_noise, &mut random);
         }
         data.trajectories.push(trajectory);
         seen(index + 1, files.len());

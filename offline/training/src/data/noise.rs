@@ -4,8 +4,10 @@ use super::Trajectory;
 use crate::random::Random;
 
 /// Adds independent normal noise to the labels; `sd` is that of the whole vector, as trackers state it, in the labels' unit.
-/// [`Trajectory::exact`] stays.
+/// [`Trajectory::exact`] stays, and
+/// [`Trajectory::noise`] says it.
 pub fn add_noise(trajectory: &mut Trajectory, outputs: usize, sd: f64, random: &mut Random) {
+    trajectory.noise = sd;
     let per_axis = sd / (outputs.max(1) as f64).sqrt();
     for label in &mut trajectory.labels {
         *label += (per_axis * random.normal()) as f32;

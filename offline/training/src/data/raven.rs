@@ -1,28 +1,31 @@
 //! A RAVEN-II's recordings: full states with truth become `raven118-v1` and the tip's error in mm.
 
 use super::memory;
-use super::{DataSet, Reading, Trajectory};
+use super::{DataSet, Reading, Target, Trajectory};
 use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use ravenpose::guard::Guard;
 use ravenpose::memory::{Memory, Play, may_follow_recorded};
 use ravenpose_wire::{FEATURES, PEDAL_DOWN, RavenState, features};
 use recordings::open::{Opened, open};
-use recordings::stream::{Record, Truth};
+use recordings::stream::{Record, Truth, is_truth_measured};
 use std::path::Path;
 
 /// A truth further from every state than this belongs to none: half a period of the slowest recordings (100 Hz).
 const APART_MAX_NS: i64 = 5_000_000;
 /// No arm of half a metre is off by more: units or frames contradict each other then.
 const ERROR_MAX_MM: f64 = 100.0;
+/// The same of the orientation.
+const ERROR_MAX_DEG: f64 = 60.0;
 /// A second memory begins anew after so many seconds, one after the other: what a service knows soon after its start.
 const YOUNG_S: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
 /// A data set of a RAVEN-II without trajectories.
-pub(super) fn empty(plays: &[Play]) -> DataSet {
+pub(super) fn empty(target: Target, plays: &[Play]) -> DataSet {
     DataSet {
         input_names: (0..FEATURES).map(features::name).chain(memory::names(plays)).collect(),
-        output_names: ["error_x_mm", "error_y_mm", "error_z_mm"].map(str::to_owned).to_vec(),
+        output_names: target.outputs().map(str::to_owned).to_vec(),
         is_raven: true,
         ..DataSet::default()
     }
@@ -42,6 +45,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
     };
     let mut pairing = Pairing::new(file, reading);
     let mut source = source;
+    pairing.found.is_measured = is_truth_measured(source.metadata());
     loop {
         match source.next().map_err(|error| TrainingError::Recording(error.to_string()))? {
             Some(Record::State(state)) => pairing.state(state),
@@ -59,6 +63,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
 struct Pairing<'a> {
     file: &'a Path,
     side: Side,
+    target: Target,
     arm: arm::Arm,
     period_ns: i64,
     state: Option<Box<RavenState>>,
@@ -90,6 +95,7 @@ impl<'a> Pairing<'a> {
         Self {
             file,
             side,
+            target: reading.target,
             arm: Raven2::nominal().arm(side),
             period_ns: (1e9 / reading.truth_hz.max(1e-3)) as i64,
             state: None,
@@ -189,31 +195,59 @@ impl<'a> Pairing<'a> {
             let what = format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature));
             return Some(self.unfit(what, "remove the row or record again"));
         }
-        if norm(label) > ERROR_MAX_MM {
-            let what = format!("truth and reported tip are {:.0} mm apart {time_s:.3} s after the first truth", norm(label));
-            return Some(
-                self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm"),
-            );
-        }
-        None
+        let (limit, how) = match self.target {
+            Target::Position => (ERROR_MAX_MM, "mm apart"),
+            Target::Orientation => (ERROR_MAX_DEG, "deg turned against each other"),
+        };
+        (norm(label) > limit).then(|| {
+            let what = format!("truth and reported tip are {:.0} {how} {time_s:.3} s after the first truth", norm(label));
+            self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm")
+        })
     }
 
-    /// True minus reported tip, mm, frame 0; none where the truth does not say.
+    /// What is to be learnt; none where the truth does not say.
     fn label(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
+        match self.target {
+            Target::Position => self.shift(state, truth),
+            Target::Orientation => self.turn(state, truth),
+        }
+    }
+
+    /// From the reported to the true orientation: rotation vector, degrees, frame 0.
+    fn turn(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
+        let [w, x, y, z] = truth.quaternion_wxyz;
+        let (reported, there) = if truth.quaternion_wxyz.iter().all(|part| part.is_finite()) {
+            let rows = &state.ori[9 * self.side.index()..][..9];
+            let matrix = Matrix3::from_row_iterator(rows.iter().map(|part| f64::from(*part)));
+            let reported = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+            // Of a matrix in float32.
+            (UnitQuaternion::new_normalize(*reported), UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)))
+        } else {
+            let (reported, there) = self.by_joints(state, truth)?;
+            let turned = |joints| UnitQuaternion::from_rotation_matrix(&self.arm.kinematics.tip(joints).rotation);
+            (turned(&reported), turned(&there))
+        };
+        Some((there * reported.inverse()).scaled_axis().map(f64::to_degrees).into())
+    }
+
+    /// Joints as reported, and with joints 1 to 3 as encoders at the joints have them (the lab's 252 columns).
+    fn by_joints(&self, state: &RavenState, truth: &Truth) -> Option<(arm::Joints, arm::Joints)> {
+        let reported = reported_joints(state, self.side);
+        let mut there = reported;
+        there[..3].copy_from_slice(&truth.joints[..3]);
+        there.iter().all(|part| part.is_finite()).then_some((reported, there))
+    }
+
+    /// True minus reported tip, mm, frame 0.
+    fn shift(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
         let at = 3 * self.side.index();
         let reported_m: [f64; 3] = std::array::from_fn(|axis| f64::from(state.pos[at + axis]) * 1e-6);
         if truth.position_m.iter().all(|part| part.is_finite()) {
             return Some(std::array::from_fn(|axis| (truth.position_m[axis] - reported_m[axis]) * 1e3));
         }
-        // Encoders at joints 1 to 3 (the lab's 252 columns): the tip that they and the reported tool joints make.
-        if truth.joints[..3].iter().all(|part| part.is_finite()) {
-            let mut joints = reported_joints(state, self.side);
-            let before = self.arm.kinematics.tip_position(&joints);
-            joints[..3].copy_from_slice(&truth.joints[..3]);
-            let after = self.arm.kinematics.tip_position(&joints);
-            return Some(std::array::from_fn(|axis| (after[axis] - before[axis]) * 1e3));
-        }
-        None
+        let (reported, there) = self.by_joints(state, truth)?;
+        let (before, after) = (self.arm.kinematics.tip_position(&reported), self.arm.kinematics.tip_position(&there));
+        Some(std::array::from_fn(|axis| (after[axis] - before[axis]) * 1e3))
     }
 
     fn unfit(&self, what: String, remedy: &'static str) -> TrainingError {
@@ -235,7 +269,8 @@ impl<'a> Pairing<'a> {
             notes.push(format!("{file}: does not say its run levels: all its truths are used"));
         }
         if self.found.rows() == 0 {
-            let looked_for = format!("no true tip and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
+            let tip = if self.target == Target::Position { "tip" } else { "orientation of the tip" };
+            let looked_for = format!("no true {tip} and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
             return Err(TrainingError::NoTruth { file, looked_for });
         }
         self.found.exact.clone_from(&self.found.labels);

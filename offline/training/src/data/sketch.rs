@@ -2,6 +2,7 @@
 //! they begin? The smallest hashes of a run's rows (bottom-k sketch; Broder 1997): of two runs that share a part of their rows they share
 //! the same part.
 
+use crate::random::{GOLDEN, mixed};
 use std::collections::BTreeSet;
 
 /// Hashes kept of each run.
@@ -17,14 +18,7 @@ pub struct Sketch(BTreeSet<u64>);
 impl Sketch {
     /// Adds a row, every number as it was read.
     pub fn add(&mut self, row: impl IntoIterator<Item = f32>) {
-        // Steele, Lea and Flood's mixing of 64 bits (SplitMix).
-        let mix = |x: u64| {
-            let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            x ^ (x >> 31)
-        };
-        let hash =
-            row.into_iter().fold(0, |hash, number| mix(hash ^ u64::from(number.to_bits())).wrapping_add(0x9e37_79b9_7f4a_7c15));
+        let hash = row.into_iter().fold(0, |hash, number| mixed(hash ^ u64::from(number.to_bits())).wrapping_add(GOLDEN));
         if self.0.len() < KEPT || self.0.last().is_some_and(|last| hash < *last) {
             self.0.insert(hash);
             if self.0.len() > KEPT {

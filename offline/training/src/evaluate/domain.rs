@@ -1,7 +1,7 @@
 //! How often the bound that the card states holds, and how often its domain is left: computed as the service does.
 
 use super::{FarOff, Load, Rest, Trust, Unsettled};
-use crate::card::VALIDATION_RMS;
+use crate::card::{VALIDATION_RMS, distance};
 use crate::commands::Model;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
@@ -36,8 +36,7 @@ pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory],
             }
         }
         outside += usize::from(!inside);
-        let squares: f64 = row.iter().zip(&center).zip(&weight).map(|((x, c), w)| f64::from((x - c) * w).powi(2)).sum();
-        let is_beyond = squares.sqrt() > limit;
+        let is_beyond = distance(row, &center, &weight) > limit;
         beyond += usize::from(is_beyond);
         doubtful.push(!inside || is_beyond);
     }

@@ -5,8 +5,8 @@ mod domain;
 mod metrics;
 mod page;
 
-use crate::commands::{Model, write_whole};
-use crate::data::{self, Reading, Sketch, Trajectory};
+use crate::commands::{Model, TARGET, TRUTH_NOISE, write_whole};
+use crate::data::{self, Reading, Sketch, Target, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::rivals;
 use metrics::{AllFigures, Interval, Rest};
@@ -238,12 +238,10 @@ fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajector
 /// [`TrainingError`]: model, data, or a folder that cannot be written.
 pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
     let model = Model::read(wish.model)?;
-    if wish.out.is_file() {
-        return Err(TrainingError::file(wish.out, "is a file", "give a folder with --out"));
-    }
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
-        truth_noise_mm: model.number("ravenpose.truth_noise_mm").unwrap_or(0.0),
+        truth_noise: model.number(TRUTH_NOISE).unwrap_or(0.0),
+        target: model.card.get(TARGET).and_then(|name| Target::of_name(name)).unwrap_or_default(),
         plays: model.chain.plays.clone(),
         ..wish.reading.clone()
     };
@@ -259,14 +257,15 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         return Err(TrainingError::Model { file: shown(wish.model), what });
     }
     for (key, found) in [("ravenpose.inputs", &set.input_names), ("ravenpose.outputs", &set.output_names)] {
-        let of_training = model.card.get(key).filter(|_| !set.is_raven);
-        if of_training.is_some_and(|words| *words != found.join(" ")) {
-            let what = format!("was trained on {}, not on {}", of_training.map_or("", String::as_str), found.join(" "));
+        let found = found.join(" ");
+        // Cards of a RAVEN-II name none: its layout does.
+        if let Some(trained_on) = model.card.get(key).filter(|trained_on| **trained_on != found) {
+            let what = format!("was trained on {trained_on}, not on {found}");
             let remedy = "give --inputs, --truth, --reported and --plays as they were given to `ravenpose train`";
             return Err(TrainingError::Unfit { file: shown(wish.model), what, remedy });
         }
     }
-    let outputs = set.outputs();
+    let (outputs, unit) = (set.outputs(), set.unit());
     if !set.is_raven && !model.chain.plays.is_empty() {
         let what = "has a memory of a RAVEN-II's joints".to_owned();
         return Err(TrainingError::Unfit {
@@ -284,9 +283,10 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             remedy: "give runs that it has not seen",
         });
     }
-    // As the service reads it.
+    // As the service reads it; one of the orientation it refuses.
     let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
-    let card = set.is_raven.then(|| Card::read(&model.card)).transpose().map_err(refused)?;
+    let is_service = set.is_raven && reading.target == Target::Position;
+    let card = is_service.then(|| Card::read(&model.card)).transpose().map_err(refused)?;
     if let Some(card) = &card {
         card.check_memory(model.chain.plays.len()).map_err(refused)?;
     }
@@ -299,7 +299,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
     methods.push(judge.method("model", "this model file", &estimates, None, Some(estimate_us)));
     if wish.rivals && !train.is_empty() {
         // Rivals see the 118 features alone: the memory is the model's.
-        for (name, what, mut rival) in rivals::all(set.is_raven.then_some(reading.arm), own_inputs, wish.seed) {
+        for (name, what, mut rival) in rivals::all(set.is_raven.then_some((reading.arm, reading.target)), own_inputs, wish.seed) {
             told(name);
             let begun = Instant::now();
             rival.fit(&train, outputs);
@@ -342,7 +342,6 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
     let json = serde_json::to_string_pretty(&report)
         .map_err(|error| TrainingError::file(wish.out, format!("cannot hold the report: {error}"), "choose another --out"))?;
     write_whole(&wish.out.join("report.json"), json.as_bytes())?;
-    let unit = if set.is_raven { "mm" } else { "units of the truth" };
     write_whole(&wish.out.join("report.html"), page::page(&report, &test, &estimates, unit).as_bytes())?;
     Ok(report)
 }

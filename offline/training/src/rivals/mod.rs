@@ -7,7 +7,7 @@ mod polynomial;
 mod recurrent;
 mod rigid;
 
-use crate::data::Trajectory;
+use crate::data::{Target, Trajectory};
 use crate::prepare;
 use arm::Side;
 use ndarray::Array2;
@@ -30,11 +30,11 @@ pub trait Rival {
 /// Features of `raven118-v1` that describe the posture: `jpos` of the seven joints.
 pub(crate) const POSTURE: [usize; 7] = [56, 57, 58, 60, 61, 62, 63];
 
-/// The rivals that a data set of an arm of a RAVEN-II, or of a table, allows, with a name and where they come from.
-pub fn all(arm: Option<Side>, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
+/// The rivals that a data set of an arm of a RAVEN-II, or of a table, allows, with a name and where they come from. Two know positions only.
+pub fn all(arm: Option<(Side, Target)>, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
     let every: Vec<usize> = (0..inputs).collect();
     let mut rivals: Vec<(&'static str, &'static str, Box<dyn Rival>)> = Vec::new();
-    if let Some(side) = arm {
+    if let Some((side, target)) = arm {
         rivals.push(("static map of posture", "random forest on the seven joints", Box::new(Forest::new(&POSTURE, seed))));
         rivals.push(("linear regression", "Peng 2024: all features", Box::new(Polynomial::linear(every))));
         rivals.push((
@@ -42,17 +42,21 @@ pub fn all(arm: Option<Side>, inputs: usize, seed: u64) -> Vec<(&'static str, &'
             "Peng 2024: posture, torque, lag, speed",
             Box::new(Polynomial::second_order_of_raven()),
         ));
-        rivals.push(("rigid + random forest", "Seita 2018: two phases", Box::new(RigidForest::new(seed))));
+        if target == Target::Position {
+            rivals.push(("rigid + random forest", "Seita 2018: two phases", Box::new(RigidForest::new(seed))));
+        }
         rivals.push((
             "Gaussian process",
             "Mahler 2014: posture and speed, 600 inducing points",
             Box::new(Gaussian::of_raven(seed)),
         ));
-        rivals.push((
-            "dual unscented Kalman filter",
-            "Haghighipanah 2015: elastic cables, at the truth's rate",
-            Box::new(Kalman::of_raven(side)),
-        ));
+        if target == Target::Position {
+            rivals.push((
+                "dual unscented Kalman filter",
+                "Haghighipanah 2015: elastic cables, at the truth's rate",
+                Box::new(Kalman::of_raven(side)),
+            ));
+        }
         rivals.push((
             "gated recurrent unit",
             "Cho 2014: reads what the default network sees of each state, without its memory, row by row",

@@ -9,10 +9,11 @@ use crate::network::{Adam, Network, NormPlace};
 use crate::prepare::Prepared;
 use crate::preset::{First, Recipe, Schedule};
 use crate::random::Random;
+use crate::split::Parts;
 use linear::Linear;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Purpose of the stream of random numbers for weights and order of rows.
@@ -66,11 +67,6 @@ pub struct Trained {
 }
 
 impl Trained {
-    /// Least RMS on the validation trajectories, with its epoch.
-    pub fn best(&self) -> Option<&Point> {
-        self.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms))
-    }
-
     /// Estimates for rows of raw inputs, row-major, in the labels' unit.
     pub fn estimate(&self, inputs: &[f32]) -> Vec<f32> {
         let raw = self.prepared.mean.len().max(1);
@@ -83,6 +79,11 @@ impl Trained {
         }
         out
     }
+}
+
+/// The point with the least RMS on validation.
+pub fn best(curves: &[Point]) -> Option<&Point> {
+    curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms))
 }
 
 /// Rows as the network sees them.
@@ -101,21 +102,31 @@ pub(crate) struct Course {
     seconds: f64,
 }
 
-/// Learns from `train` and chooses by `validation`. With a checkpoint file it goes on where that file is, and keeps it up to date.
+/// Learns from the first of the parts and chooses by the second. With a checkpoint file it goes on where that file is, and keeps it up to date.
 ///
 /// # Errors
 /// [`TrainingError`] for inputs that are all constant, a checkpoint of another run, or training that diverges.
 pub fn train(
-    train: &[Trajectory],
-    validation: &[Trajectory],
+    parts: &Parts,
     outputs: usize,
     recipe: &Recipe,
     checkpoint: Option<&Path>,
     told: &mut dyn FnMut(&Progress),
 ) -> Result<Trained, TrainingError> {
     if recipe.first == First::Either {
-        return either(train, validation, outputs, recipe, checkpoint, told);
+        let files = ["nothing", "linear"].map(|extension| checkpoint.map(|file| file.with_added_extension(extension)));
+        let mut with =
+            |first, file: &Option<PathBuf>| train(parts, outputs, &Recipe { first, ..recipe.clone() }, file.as_deref(), told);
+        let (without, after) = (with(First::Nothing, &files[0])?, with(First::Linear, &files[1])?);
+        // Only now: until both are there a kill must not lose the first.
+        for file in files.iter().flatten() {
+            drop(std::fs::remove_file(file));
+        }
+        let left = |trained: &Trained| best(&trained.curves).map_or(f64::INFINITY, |best| best.validation_rms);
+        let seconds = without.seconds + after.seconds;
+        return Ok(Trained { seconds, ..if left(&without) <= left(&after) { without } else { after } });
     }
+    let Parts { train, validation, .. } = parts;
     let inputs = train.first().map_or(0, |one| one.inputs.len() / one.rows().max(1));
     let prepared = Prepared::fit(train, inputs, recipe.preparation)?;
     let (label_mean, label_scale) = label_statistics(train, outputs);
@@ -165,30 +176,6 @@ pub fn train(
     Ok(Trained { network, prepared, label_mean, label_scale, curves: course.curves, seconds: course.seconds, has_line })
 }
 
-/// With a line first, and without: what leaves less on validation.
-fn either(
-    learnt: &[Trajectory],
-    validation: &[Trajectory],
-    outputs: usize,
-    recipe: &Recipe,
-    checkpoint: Option<&Path>,
-    told: &mut dyn FnMut(&Progress),
-) -> Result<Trained, TrainingError> {
-    let mut with = |first: First, extension: &str| {
-        let checkpoint = checkpoint.map(|file| file.with_added_extension(extension));
-        let trained = train(learnt, validation, outputs, &Recipe { first, ..recipe.clone() }, checkpoint.as_deref(), told)?;
-        Ok::<_, TrainingError>((trained, checkpoint))
-    };
-    let (a, b) = (with(First::Nothing, "nothing")?, with(First::Linear, "linear")?);
-    // Only now: until both are there a kill must not lose the first.
-    for file in [a.1, b.1].into_iter().flatten() {
-        drop(std::fs::remove_file(file));
-    }
-    let left = |trained: &Trained| trained.best().map_or(f64::INFINITY, |best| best.validation_rms);
-    let seconds = a.0.seconds + b.0.seconds;
-    Ok(Trained { seconds, ..if left(&a.0) <= left(&b.0) { a.0 } else { b.0 } })
-}
-
 /// Mean per output, and one scale for all: the RMS deviation over all outputs.
 pub(crate) fn label_statistics(train: &[Trajectory], outputs: usize) -> (Vec<f64>, f64) {
     let labels = || train.iter().flat_map(|one| one.labels.chunks_exact(outputs.max(1)));
@@ -235,8 +222,7 @@ impl Course {
 
     /// No better validation for so many epochs?
     fn is_stale(&self, patience: usize) -> bool {
-        let best = self.curves.iter().min_by(|a, b| a.validation_rms.total_cmp(&b.validation_rms));
-        best.is_some_and(|best| self.epochs() - best.epoch >= patience)
+        best(&self.curves).is_some_and(|best| self.epochs() - best.epoch >= patience)
     }
 
     /// One pass over all rows in random order; the RMS on the way, in units of the network's output.
