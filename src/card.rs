@@ -1,15 +1,48 @@
 //! The model card: ONNX metadata that says what a network may be used for. `docs/models.md` describes every property.
 
+use crate::correction::Quantity;
 use crate::guard::{Allowed, Domain};
 use crate::load::{self, LoadCard};
 use ravenpose_wire::{FEATURES, PEDAL_DOWN, features};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// Units that the network must speak: inputs exactly as published, output in mm.
-pub const UNITS: &str = "raven_state as published; position error in mm";
-/// Correction bound of a card that states none: the paper reports errors up to 10 mm.
-const BOUND_MM: f64 = 15.0;
+/// Properties that depend on what a model corrects.
+struct Keys {
+    bound: &'static str,
+    bound95: &'static str,
+    bound95_unsettled: &'static str,
+    /// Correction bound of a card that states none.
+    default_bound: f64,
+}
+
+impl Quantity {
+    /// Units that the network must speak: inputs exactly as published, outputs in mm or degrees.
+    pub const fn units(self) -> &'static str {
+        match self {
+            Self::Position => "raven_state as published; position error in mm",
+            Self::Orientation => "raven_state as published; orientation error in deg",
+        }
+    }
+
+    const fn keys(self) -> Keys {
+        match self {
+            // The paper reports errors up to 10 mm.
+            Self::Position => Keys {
+                bound: "ravenpose.correction_bound_mm",
+                bound95: "ravenpose.bound95_mm",
+                bound95_unsettled: "ravenpose.bound95_unsettled_mm",
+                default_bound: 15.0,
+            },
+            Self::Orientation => Keys {
+                bound: "ravenpose.correction_bound_deg",
+                bound95: "ravenpose.bound95_deg",
+                bound95_unsettled: "ravenpose.bound95_unsettled_deg",
+                default_bound: 30.0,
+            },
+        }
+    }
+}
 
 /// Why a card was refused; the caller adds the file's name.
 #[derive(Debug, Error, PartialEq)]
@@ -45,7 +78,7 @@ pub enum CardError {
 pub struct Golden {
     /// 118 features; a memory has seen nothing else.
     pub input: [f32; FEATURES],
-    /// Position error, mm.
+    /// Error of the position, mm, or of the orientation, degrees.
     pub output: [f64; 3],
 }
 
@@ -60,12 +93,14 @@ pub struct Card {
     pub domain: Option<Domain>,
     /// States that the model may be used with.
     pub allowed: Allowed,
-    /// Largest correction that the model stands for, mm.
-    pub bound_mm: f64,
-    /// 95 % half width per axis, mm; NaN if none is stated.
-    pub bound95_mm: [f64; 3],
-    /// The same while the model's memory is not settled, mm; NaN if none is stated.
-    pub bound95_unsettled_mm: [f64; 3],
+    /// What the model corrects.
+    pub quantity: Quantity,
+    /// Longest correction that the model stands for, mm or degrees.
+    pub bound: f64,
+    /// 95 % half width per axis, mm or degrees; NaN if none is stated.
+    pub bound95: [f64; 3],
+    /// The same while the model's memory is not settled; NaN if none is stated.
+    pub bound95_unsettled: [f64; 3],
     /// What torque says about load; none if the model does not watch it.
     pub load: Option<LoadCard>,
     /// Golden pairs.
@@ -73,15 +108,15 @@ pub struct Card {
 }
 
 impl Card {
-    /// Reads the card. A model without `ravenpose.trained_on` counts as untrained and need not state a domain.
+    /// Reads the card of a model that is to correct `quantity`. A model without `ravenpose.trained_on` counts as untrained and need not state a domain.
     ///
     /// # Errors
     /// [`CardError`].
-    pub fn read(metadata: &BTreeMap<String, String>) -> Result<Self, CardError> {
+    pub fn read(metadata: &BTreeMap<String, String>, quantity: Quantity) -> Result<Self, CardError> {
         let get = |key: &str| metadata.get(key).map(String::as_str);
         let trained_on = get("ravenpose.trained_on").unwrap_or("").trim().to_owned();
         let untrained = trained_on.is_empty() || trained_on.starts_with("nothing");
-        for (key, expected) in [("ravenpose.feature_layout", features::LAYOUT), ("ravenpose.units", UNITS)] {
+        for (key, expected) in [("ravenpose.feature_layout", features::LAYOUT), ("ravenpose.units", quantity.units())] {
             match get(key) {
                 Some(found) if found == expected => {}
                 None if untrained => {}
@@ -92,13 +127,14 @@ impl Card {
             }
         }
         let domain = domain(metadata, untrained)?;
-        let bound_mm = match get("ravenpose.correction_bound_mm") {
-            None => BOUND_MM,
+        let keys = quantity.keys();
+        let bound = match get(keys.bound) {
+            None => keys.default_bound,
             Some(text) => {
-                let key = "ravenpose.correction_bound_mm";
+                let key = keys.bound;
                 let [bound] = numbers::<1>(key, text)?;
                 if bound <= 0.0 {
-                    return Err(CardError::Numbers { key, problem: format!("{bound} is not a positive length") });
+                    return Err(CardError::Numbers { key, problem: format!("{bound} is not positive") });
                 }
                 f64::from(bound)
             }
@@ -111,8 +147,8 @@ impl Card {
                 None => Ok(bounds),
             }
         };
-        let bound95_mm = half_widths("ravenpose.bound95_mm")?;
-        let bound95_unsettled_mm = half_widths("ravenpose.bound95_unsettled_mm")?;
+        let bound95 = half_widths(keys.bound95)?;
+        let bound95_unsettled = half_widths(keys.bound95_unsettled)?;
         let allowed = Allowed {
             runlevels: match get("ravenpose.runlevels") {
                 Some(text) => integers("ravenpose.runlevels", text)?,
@@ -126,7 +162,7 @@ impl Card {
         if golden.is_empty() && !untrained {
             return Err(CardError::Missing { key: "ravenpose.golden" });
         }
-        Ok(Self { untrained, trained_on, domain, allowed, bound_mm, bound95_mm, bound95_unsettled_mm, load, golden })
+        Ok(Self { untrained, trained_on, domain, allowed, quantity, bound, bound95, bound95_unsettled, load, golden })
     }
 
     /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one; what watches the
@@ -140,13 +176,14 @@ impl Card {
             let problem = format!("{} numbers per motor, expected {expected} for {plays} plays", row.len());
             return Err(CardError::Numbers { key: LOAD[0], problem });
         }
-        let wrong = |problem: &str| Err(CardError::Numbers { key: "ravenpose.bound95_unsettled_mm", problem: problem.to_owned() });
-        let stated = self.bound95_unsettled_mm.iter().all(|bound| bound.is_finite());
-        if self.bound95_unsettled_mm.iter().zip(self.bound95_mm).any(|(unsettled, settled)| *unsettled < settled) {
-            return wrong("is narrower than ravenpose.bound95_mm");
+        let keys = self.quantity.keys();
+        let wrong = |problem: String| Err(CardError::Numbers { key: keys.bound95_unsettled, problem });
+        let stated = self.bound95_unsettled.iter().all(|bound| bound.is_finite());
+        if self.bound95_unsettled.iter().zip(self.bound95).any(|(unsettled, settled)| *unsettled < settled) {
+            return wrong(format!("is narrower than {}", keys.bound95));
         }
         if stated && plays == 0 {
-            return wrong("the network has no memory");
+            return wrong("the network has no memory".to_owned());
         }
         Ok(())
     }

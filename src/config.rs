@@ -1,5 +1,6 @@
 //! `ravenposed.toml`: strict, every complaint with file, line, column, key and remedy.
 
+use crate::correction::{Pace, Quantity};
 use crate::cycle::Limits;
 use crate::network::Format;
 use ravenpose_transport::Settings;
@@ -77,8 +78,8 @@ pub struct Config {
     pub lock_memory: bool,
     /// Limits of the cycle.
     pub limits: Limits,
-    /// Model of the gold and of the green arm.
-    pub models: [Option<ModelSource>; 2],
+    /// Models of the gold and of the green arm.
+    pub models: [Option<ArmSources>; 2],
     /// Where `stats.json` is written each second.
     pub runtime_dir: PathBuf,
     /// Where histograms are written; none if absent.
@@ -87,8 +88,17 @@ pub struct Config {
     pub interval_s: u64,
 }
 
-/// Largest deviation of smaller weights that is allowed unless the configuration says otherwise, µm.
-pub const WEIGHTS_DEVIATION_UM: f64 = 10.0;
+/// Largest deviation of smaller weights that is allowed unless the configuration says otherwise, thousandths of the network's unit.
+pub const WEIGHTS_DEVIATION: f64 = 10.0;
+
+/// The models of one arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmSources {
+    /// Corrects the position.
+    pub position: ModelSource,
+    /// Corrects the orientation.
+    pub orientation: Option<ModelSource>,
+}
 
 /// A model file, the hash that it must have, and how its weights are to be stored.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,14 +109,16 @@ pub struct ModelSource {
     pub sha256: Option<String>,
     /// The format of the weights; the smallest that is exact enough if none is stated.
     pub weights: Option<Format>,
-    /// Largest deviation from float64 that smaller weights may bring, µm.
-    pub weights_deviation_um: f64,
+    /// Largest deviation from float64 that smaller weights may bring, thousandths of the network's unit: µm, or of a degree.
+    pub weights_deviation: f64,
+    /// What it corrects.
+    pub quantity: Quantity,
 }
 
 impl ModelSource {
-    /// A file with its hash beside it and everything else as by default.
+    /// A file that corrects the position, with its hash beside it and everything else as by default.
     pub fn new(path: PathBuf) -> Self {
-        Self { path, sha256: None, weights: None, weights_deviation_um: WEIGHTS_DEVIATION_UM }
+        Self { path, sha256: None, weights: None, weights_deviation: WEIGHTS_DEVIATION, quantity: Quantity::Position }
     }
 }
 
@@ -145,7 +157,7 @@ impl Config {
         let transport = transport(file.table("transport")?)?;
         let mut looping = file.table("loop")?;
         let limits = limits(file.table("limits")?)?;
-        let models = [model(file.optional_table("gold")?, base)?, model(file.optional_table("green")?, base)?];
+        let models = [arm_models(file.optional_table("gold")?, base)?, arm_models(file.optional_table("green")?, base)?];
         let mut report = file.table("report")?;
         let config = Self {
             allow_untrained,
@@ -180,9 +192,16 @@ fn limits(mut table: Table) -> Result<Limits, ConfigError> {
         stale_ns: table.integer("stale_us", 100..=1_000_000)?.map_or(default.stale_ns, |us| us * 1000),
         budget_ns: table.integer("budget_us", 1..=100_000)?.map_or(default.budget_ns, |us| us * 1000),
         good_cycles: table.integer("good_cycles", 1..=100_000)?.unwrap_or(100) as u32,
-        recover_um: table.number("recover_um_per_cycle", 0.01..=1000.0)?.unwrap_or(default.recover_um),
-        rate_um: table.number("rate_um_per_cycle", 0.01..=15_000.0)?.unwrap_or(default.rate_um),
-        envelope_um: table.number("envelope_mm", 0.01..=50.0)?.map_or(default.envelope_um, |mm| mm * 1000.0),
+        position: Pace {
+            recover: table.number("recover_um_per_cycle", 0.01..=1000.0)?.unwrap_or(default.position.recover),
+            rate: table.number("rate_um_per_cycle", 0.01..=15_000.0)?.unwrap_or(default.position.rate),
+            envelope: table.number("envelope_mm", 0.01..=50.0)?.map_or(default.position.envelope, |mm| mm * 1000.0),
+        },
+        orientation: Pace {
+            recover: table.number("recover_deg_per_cycle", 0.0001..=2.0)?.unwrap_or(default.orientation.recover),
+            rate: table.number("rate_deg_per_cycle", 0.0001..=90.0)?.unwrap_or(default.orientation.rate),
+            envelope: table.number("envelope_deg", 0.01..=90.0)?.unwrap_or(default.orientation.envelope),
+        },
         late_degraded: table.integer("late_degraded", 1..=1000)?.unwrap_or(3) as u32,
         late_fallback: table.integer("late_fallback", 1..=1000)?.unwrap_or(10) as u32,
     };
@@ -211,19 +230,26 @@ fn transport(mut table: Table) -> Result<Settings, ConfigError> {
     Ok(settings)
 }
 
-fn model(table: Option<Table>, base: &Path) -> Result<Option<ModelSource>, ConfigError> {
+fn arm_models(table: Option<Table>, base: &Path) -> Result<Option<ArmSources>, ConfigError> {
     let Some(mut table) = table else { return Ok(None) };
+    let orientation = table.optional_table("orientation")?;
+    let position = model(table, base, Quantity::Position)?;
+    let orientation = orientation.map(|table| model(table, base, Quantity::Orientation)).transpose()?;
+    Ok(Some(ArmSources { position, orientation }))
+}
+
+fn model(mut table: Table, base: &Path, quantity: Quantity) -> Result<ModelSource, ConfigError> {
     let path = table.path("model")?;
     let hash = |text: &str| text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit());
     let sha256 = table.text("sha256", "64 hexadecimal digits, as `sha256sum MODEL.onnx` prints", hash)?;
     let weights = table.weights("weights")?;
-    let weights_deviation_um = table.number("weights_deviation_um", 0.001..=1000.0)?.unwrap_or(WEIGHTS_DEVIATION_UM);
-    let (source, name, start) = (table.source, table.name, table.start);
+    let weights_deviation = table.number(quantity.deviation_key(), 0.001..=1000.0)?.unwrap_or(WEIGHTS_DEVIATION);
+    let (source, name, start) = (table.source, table.name.clone(), table.start);
     table.finish()?;
     match path {
         Some(path) => {
             let sha256 = sha256.map(|hash| hash.to_ascii_lowercase());
-            Ok(Some(ModelSource { path: base.join(path), sha256, weights, weights_deviation_um }))
+            Ok(ModelSource { path: base.join(path), sha256, weights, weights_deviation, quantity })
         }
         None => Err(source.error(start, format!("{name}.model is missing; add model = \"FILE.onnx\" to [{name}]"))),
     }
@@ -250,7 +276,7 @@ impl<'a> Source<'a> {
 
     fn document(self) -> Result<Table<'a>, ConfigError> {
         let entries = DeTable::parse(self.text).map_err(|error| self.syntax(&error))?.into_inner();
-        Ok(Table { source: self, name: "", start: 0, entries, taken: Vec::new() })
+        Ok(Table { source: self, name: String::new(), start: 0, entries, taken: Vec::new() })
     }
 
     fn syntax(&self, error: &toml::de::Error) -> ConfigError {
@@ -278,7 +304,7 @@ impl<'a> Source<'a> {
 struct Table<'a> {
     source: Source<'a>,
     /// Empty for the file itself.
-    name: &'static str,
+    name: String,
     start: usize,
     entries: DeTable<'a>,
     taken: Vec<&'static str>,
@@ -302,13 +328,12 @@ impl<'a> Table<'a> {
     }
 
     fn refuse(&self, key: &str, value: &Spanned<DeValue>, wanted: &str) -> ConfigError {
-        let dot = if self.name.is_empty() { "" } else { "." };
         let found = match value.get_ref() {
             DeValue::Table(_) => " is a table and".to_owned(),
             DeValue::Array(_) => " is a list and".to_owned(),
             _ => format!(" = {}", one_line(self.source.text.get(value.span()).unwrap_or_default(), SHOWN_MAX)),
         };
-        self.source.error(value.span().start, format!("{}{dot}{key}{found} must be {wanted}", self.name))
+        self.source.error(value.span().start, format!("{}{found} must be {wanted}", self.full_name(key)))
     }
 
     fn integer(&mut self, key: &'static str, allowed: RangeInclusive<i64>) -> Result<Option<i64>, ConfigError> {
@@ -357,14 +382,20 @@ impl<'a> Table<'a> {
 
     fn optional_table(&mut self, key: &'static str) -> Result<Option<Self>, ConfigError> {
         let (source, start) = (self.source, self.place(key).unwrap_or(0));
-        let entries = self.take(key, &format!("a table, written [{key}] once"), |value| value.as_table().cloned())?;
-        Ok(entries.map(|entries| Self { source, name: key, start, entries, taken: Vec::new() }))
+        let name = self.full_name(key);
+        let entries = self.take(key, &format!("a table, written [{name}] once"), |value| value.as_table().cloned())?;
+        Ok(entries.map(|entries| Self { source, name, start, entries, taken: Vec::new() }))
+    }
+
+    /// `limits.stale_us`.
+    fn full_name(&self, key: &str) -> String {
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
 
     /// The table, or an empty one.
     fn table(&mut self, key: &'static str) -> Result<Self, ConfigError> {
-        let source = self.source;
-        let empty = || Self { source, name: key, start: 0, entries: DeTable::new(), taken: Vec::new() };
+        let (source, name) = (self.source, self.full_name(key));
+        let empty = || Self { source, name, start: 0, entries: DeTable::new(), taken: Vec::new() };
         Ok(self.optional_table(key)?.unwrap_or_else(empty))
     }
 

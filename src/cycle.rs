@@ -4,22 +4,24 @@
 //! are those of `docs/flags.md`: anything doubtful yields the raw pose with correction zero in the same cycle and a flag that says
 //! why; the correction comes back after 100 good cycles in a row, slewed.
 
+use crate::correction::{Corrector, Pace, Quantity};
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
-use crate::guard::{Allowed, Guard};
-use crate::memory::may_follow;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
 
-/// Micrometres per millimetre: the network answers in mm, messages are in µm.
-const UM_PER_MM: f64 = 1000.0;
 /// A source time this far ahead of our clock is not a time of this machine's `CLOCK_MONOTONIC`.
 const FUTURE_NS: i64 = 1_000_000;
-/// Of so many pieces of an arm that are kept warm one is the features and the guard, the others are of its weights.
+/// Models: of the position and of the orientation of each arm.
+const PLACES: usize = 2 * ARMS;
+/// Of so many pieces of a model that are kept warm one is the features and the guard, the others are of its weights.
 const WARM_ROUNDS: usize = 16;
 /// A larger gap in the sequence is a restart of the source, not a loss.
 const GAP_MAX: u64 = 10_000;
 
-/// What evaluates the network: 118 features to a position error in mm. Nothing here may allocate, block or panic.
+pub use crate::correction::{ArmModel, Model};
+
+/// What evaluates the network: 118 features to the error of a position in mm, or of an orientation in degrees. Nothing here may allocate,
+/// block or panic.
 pub trait Estimator {
     /// Does its answer depend on the states before?
     fn remembers(&self) -> bool {
@@ -51,7 +53,7 @@ pub trait Estimator {
     }
 
     /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
-    fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]);
+    fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]);
 
     /// Does a microsecond's worth of what makes the next run fast; changes no result.
     fn keep_warm(&mut self) {}
@@ -68,12 +70,10 @@ pub struct Limits {
     pub budget_ns: i64,
     /// Good cycles before a correction returns.
     pub good_cycles: u32,
-    /// Slew of a returning correction, µm per cycle.
-    pub recover_um: f64,
-    /// Largest change of a correction, µm per cycle.
-    pub rate_um: f64,
-    /// Largest correction that is believed, µm (Euclidean).
-    pub envelope_um: f64,
+    /// How corrections of the position move, µm.
+    pub position: Pace,
+    /// How those of the orientation move, degrees.
+    pub orientation: Pace,
     /// Late answers in a row that reduce trust.
     pub late_degraded: u32,
     /// Late answers in a row that end it.
@@ -87,43 +87,27 @@ impl Default for Limits {
             stale_ns: 5_000_000,
             budget_ns: 500_000,
             good_cycles: 100,
-            recover_um: 10.0,
-            rate_um: 100.0,
-            envelope_um: 15_000.0,
+            position: Pace { recover: 10.0, rate: 100.0, envelope: 15_000.0 },
+            orientation: Pace { recover: 0.02, rate: 0.2, envelope: 30.0 },
             late_degraded: 3,
             late_fallback: 10,
         }
     }
 }
 
-/// A model as the cycle uses it.
-pub struct Model<E> {
-    /// The network.
-    pub estimator: E,
-    /// Admission of its inputs.
-    pub guard: Guard,
-    /// The states that it may be used with at all.
-    pub allowed: Allowed,
-    /// First eight bytes of the file's SHA-256.
-    pub id: u64,
-    /// Largest correction that the model stands for, µm (Euclidean).
-    pub bound_um: f64,
-    /// Stated 95 % half width per axis, µm; NaN if it states none.
-    pub bound95_um: [f64; 3],
-    /// The same while the estimator is not settled.
-    pub bound95_unsettled_um: [f64; 3],
-    /// Marked untrained?
-    pub untrained: bool,
+/// What an arm is corrected with.
+pub struct ArmModels<E> {
+    /// Where its tip is. Without it nothing is corrected.
+    pub position: ArmModel<E>,
+    /// How its tip is turned; [`ArmModel::None`] passes the orientation through.
+    pub orientation: ArmModel<E>,
 }
 
-/// What an arm is corrected with.
-pub enum ArmModel<E> {
-    /// Nothing is configured for this arm.
-    None,
-    /// The configured model was refused and the configuration allows to go on.
-    Rejected,
-    /// A loaded model.
-    Loaded(Box<Model<E>>),
+impl<E> From<ArmModel<E>> for ArmModels<E> {
+    /// The position alone.
+    fn from(position: ArmModel<E>) -> Self {
+        Self { position, orientation: ArmModel::None }
+    }
 }
 
 /// Counters of everything that happened since the start.
@@ -165,11 +149,11 @@ pub trait Stopwatch {
 impl Stopwatch for () {}
 
 struct Arm<E> {
-    model: ArmModel<E>,
+    position: Corrector<E>,
+    orientation: Corrector<E>,
     frozen: FrozenWatch,
     /// Did the newest judged state show encoders that stand still?
     is_frozen: bool,
-    correction_um: Vector3<f64>,
     hold: u32,
     /// Why the hold began, kept while it lasts.
     hold_flags: u32,
@@ -201,12 +185,12 @@ pub struct Cycle<E> {
 
 impl<E: Estimator> Cycle<E> {
     /// A cycle that has seen nothing yet.
-    pub fn new(limits: Limits, models: [ArmModel<E>; ARMS], allow_untrained: bool, standing_flags: u32) -> Self {
-        let arms = models.map(|model| Arm {
-            model,
+    pub fn new(limits: Limits, models: [impl Into<ArmModels<E>>; ARMS], allow_untrained: bool, standing_flags: u32) -> Self {
+        let arms = models.map(Into::into).map(|models| Arm {
+            position: Corrector::new(Quantity::Position, models.position),
+            orientation: Corrector::new(Quantity::Orientation, models.orientation),
             frozen: FrozenWatch::default(),
             is_frozen: false,
-            correction_um: Vector3::zeros(),
             hold: limits.good_cycles,
             hold_flags: 0,
             recovering: false,
@@ -309,9 +293,12 @@ impl<E: Estimator> Cycle<E> {
 
     /// While nothing has arrived: keeps warm what answers the connected arms, one piece of one arm per call. Changes no answer.
     pub fn keep_warm(&mut self) {
-        let (round, index) = (self.warm / ARMS, self.warm % ARMS);
-        self.warm = (self.warm + 1) % (ARMS * WARM_ROUNDS);
-        let ArmModel::Loaded(model) = &mut self.arms[index].model else { return };
+        let (round, place) = (self.warm / PLACES, self.warm % PLACES);
+        self.warm = (self.warm + 1) % (PLACES * WARM_ROUNDS);
+        let index = place % ARMS;
+        let arm = &mut self.arms[index];
+        let corrector = if place < ARMS { &mut arm.position } else { &mut arm.orientation };
+        let Some(model) = corrector.loaded_mut() else { return };
         if self.newest.connected() & (1 << index) == 0 {
             return;
         }
@@ -332,17 +319,16 @@ impl<E: Estimator> Cycle<E> {
     /// A state that a newer one overtakes is not answered, but where the joints were is remembered.
     fn remember_overtaken(&mut self) {
         for (index, arm) in self.arms.iter_mut().enumerate() {
-            let ArmModel::Loaded(model) = &mut arm.model else { continue };
-            if !model.estimator.remembers() {
+            if !arm.position.remembers() && !arm.orientation.remembers() {
                 continue;
             }
             if self.newest.connected() & (1 << index) == 0 {
-                model.estimator.forget();
+                arm.forget();
                 continue;
             }
             features::extract(&self.newest, index, &mut self.features);
-            if !arm.is_frozen && may_follow(model.guard.check(&self.features).reasons) {
-                model.estimator.follow(&self.features, self.newest.source_time_ns);
+            for corrector in [&mut arm.position, &mut arm.orientation] {
+                corrector.remember(&self.newest, &self.features, arm.is_frozen);
             }
         }
     }
@@ -395,7 +381,7 @@ impl<E: Estimator> Cycle<E> {
                 judged
             } else {
                 let (reasons, information) = arm.standing(self.allow_untrained);
-                Judgement { reasons: common | reasons, information, score: -1.0, target_um: Vector3::zeros() }
+                Judgement { reasons: common | reasons, information, score: -1.0 }
             };
             arm.advance(&judged, information, &self.newest, index, &self.limits, &mut pose.arm[index]);
         }
@@ -477,34 +463,25 @@ impl<E: Estimator> Cycle<E> {
     }
 }
 
-/// What one arm's inputs and output came to, before the history is considered.
-struct Judgement {
-    reasons: u32,
-    information: u32,
-    score: f32,
-    target_um: Vector3<f64>,
+/// What one arm's inputs and outputs came to, before the history is considered.
+pub(crate) struct Judgement {
+    pub(crate) reasons: u32,
+    pub(crate) information: u32,
+    pub(crate) score: f32,
 }
 
 impl<E: Estimator> Arm<E> {
-    /// What the estimator remembers is of another source, or of before a disconnection.
     fn forget(&mut self) {
-        if let ArmModel::Loaded(model) = &mut self.model {
-            model.estimator.forget();
-        }
+        self.position.forget();
+        self.orientation.forget();
     }
 
-    /// Reasons and information that hold whatever the state is: those of the model.
+    /// Reasons and information that hold whatever the state is: those of the models.
     fn standing(&self, allow_untrained: bool) -> (u32, u32) {
-        match &self.model {
-            ArmModel::None => (flag::NO_MODEL, 0),
-            ArmModel::Rejected => (flag::MODEL_REJECTED, 0),
-            ArmModel::Loaded(model) if !model.untrained => (0, 0),
-            ArmModel::Loaded(_) if allow_untrained => (0, flag::UNTRAINED_ALLOWED),
-            ArmModel::Loaded(_) => (flag::UNTRAINED, 0),
-        }
+        let (position, orientation) = (self.position.standing(allow_untrained), self.orientation.standing(allow_untrained));
+        (position.0 | orientation.0, position.1 | orientation.1)
     }
 
-    #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
     fn judge(
         &mut self,
         state: &RavenState,
@@ -515,7 +492,7 @@ impl<E: Estimator> Arm<E> {
         common: u32,
     ) -> Judgement {
         let (reasons, information) = self.standing(allow_untrained);
-        let mut judged = Judgement { reasons: common | reasons, information, score: -1.0, target_um: Vector3::zeros() };
+        let mut judged = Judgement { reasons: common | reasons, information, score: -1.0 };
         let still = self.frozen.observe(state, index);
         self.is_frozen = still >= FROZEN_AFTER;
         match still {
@@ -523,37 +500,11 @@ impl<E: Estimator> Arm<E> {
             DEGRADED_AFTER.. => judged.information |= flag::DEGRADED,
             _ => {}
         }
-        let ArmModel::Loaded(model) = &mut self.model else { return judged };
-        let verdict = model.guard.check(features);
-        judged.reasons |= verdict.reasons;
-        judged.score = verdict.score;
-        let allowed = model.allowed.allows(state, index);
-        if !allowed {
-            judged.reasons |= flag::STATE_NOT_ALLOWED;
-        }
-        if may_follow(judged.reasons) {
-            model.estimator.follow(features, state.source_time_ns);
-            if allowed && verdict.reasons == 0 {
-                model.estimator.weigh(features, state.source_time_ns);
-            }
-            if let Some(load) = model.estimator.load_score() {
-                judged.score = judged.score.max(load);
-                if !(load <= 1.0) {
-                    judged.reasons |= flag::OUT_OF_DOMAIN;
-                    judged.information |= flag::UNSEEN_LOAD;
-                }
-            }
-        }
-        if judged.reasons != 0 {
-            return judged;
-        }
-        let mut error_mm = [0.0_f32; 3];
-        model.estimator.run(features, &mut error_mm);
-        judged.target_um = Vector3::from(error_mm.map(f64::from)) * UM_PER_MM;
-        if !error_mm.iter().all(|value| value.is_finite()) {
-            judged.reasons |= flag::OUTPUT_NOT_FINITE;
-        } else if !(judged.target_um.norm() <= model.bound_um.min(limits.envelope_um)) {
-            judged.reasons |= flag::OUTPUT_BEYOND_BOUND;
+        self.position.admit(state, index, features, &mut judged);
+        self.orientation.admit(state, index, features, &mut judged);
+        if judged.reasons == 0 {
+            self.position.answer(features, &limits.position, &mut judged);
+            self.orientation.answer(features, &limits.orientation, &mut judged);
         }
         judged
     }
@@ -571,10 +522,8 @@ impl<E: Estimator> Arm<E> {
         out.raw_position_um = raw.into();
         out.orientation.copy_from_slice(&state.ori[index * 9..index * 9 + 9]);
         out.domain_score = judged.score;
-        out.model_id = match &self.model {
-            ArmModel::Loaded(model) => model.id,
-            _ => 0,
-        };
+        out.model_id = self.position.id();
+        out.orientation_model_id = self.orientation.id();
         out.flags = information | judged.information;
         if judged.reasons != 0 {
             self.fall_back(judged.reasons, limits, out);
@@ -585,48 +534,36 @@ impl<E: Estimator> Arm<E> {
             self.show_raw(flag::SETTLING | self.hold_flags, out);
             return;
         }
-        self.correct(judged.target_um, limits, out);
-        let corrected = raw + self.correction_um;
-        out.corrected_position_um = corrected.into();
+        self.correct(limits, out);
+        out.corrected_position_um = (raw + self.position.correction).into();
     }
 
-    /// Moves the correction towards the network's answer, no faster than allowed.
-    fn correct(&mut self, target_um: Vector3<f64>, limits: &Limits, out: &mut ArmPose) {
+    /// Moves the corrections towards the networks' answers, no faster than allowed.
+    fn correct(&mut self, limits: &Limits, out: &mut ArmPose) {
         if !self.valid {
             self.valid = true;
             self.ever_valid = true;
             self.hold_flags = 0;
             self.recovering = true;
         }
-        let step_max = if self.recovering { limits.recover_um } else { limits.rate_um };
-        let missing = target_um - self.correction_um;
-        let distance = missing.norm();
-        if distance <= step_max {
-            self.correction_um = target_um;
-            self.recovering = false;
-        } else {
-            self.correction_um += missing * (step_max / distance);
+        let step_max = |pace: &Pace| if self.recovering { pace.recover } else { pace.rate };
+        let is_there =
+            [self.position.approach(step_max(&limits.position)), self.orientation.approach(step_max(&limits.orientation))]
+                == [true, true];
+        if !is_there {
             out.flags |= if self.recovering { flag::RECOVERING } else { flag::RATE_LIMITED };
         }
-        let still_missing = target_um - self.correction_um;
-        let stated = match &self.model {
-            ArmModel::Loaded(model) if model.estimator.is_settled() => model.bound95_um,
-            ArmModel::Loaded(model) => {
-                out.flags |= flag::MEMORY_UNSETTLED;
-                model.bound95_unsettled_um
-            }
-            _ => [f64::NAN; 3],
-        };
-        if let ArmModel::Loaded(model) = &self.model
-            && !model.estimator.has_weighed()
-        {
-            out.flags |= flag::LOAD_UNWEIGHED;
-        }
+        self.recovering &= !is_there;
+        let (position, orientation) = (self.position.bound95(), self.orientation.bound95());
+        out.flags |= position.1 | orientation.1;
         out.status = ArmStatus::Valid as u32;
         out.reset_count = self.reset_count;
         out.hold_cycles = 0;
-        out.correction_um = self.correction_um.into();
-        out.bound95_um = std::array::from_fn(|axis| stated[axis] + still_missing[axis].abs());
+        out.correction_um = self.position.correction.into();
+        out.bound95_um = position.0;
+        out.rotation_deg = self.orientation.correction.into();
+        out.rotation_bound95_deg = orientation.0;
+        out.corrected_orientation = turned(&out.orientation, &self.orientation.correction);
     }
 
     /// Drops to the raw pose at once; the only step that is announced instead of slewed.
@@ -637,8 +574,7 @@ impl<E: Estimator> Arm<E> {
             self.reset_count = self.reset_count.wrapping_add(1);
         }
         self.valid = false;
-        self.recovering = false;
-        self.correction_um = Vector3::zeros();
+        self.uncorrect();
         self.hold = limits.good_cycles;
         self.hold_flags |= reasons & flag::NEW_SOURCE;
         out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING | flag::MEMORY_UNSETTLED | flag::LOAD_UNWEIGHED);
@@ -650,6 +586,12 @@ impl<E: Estimator> Arm<E> {
         out.status = ArmStatus::Fallback as u32;
     }
 
+    fn uncorrect(&mut self) {
+        self.recovering = false;
+        self.position.correction = Vector3::zeros();
+        self.orientation.correction = Vector3::zeros();
+    }
+
     fn show_raw(&self, flags: u32, out: &mut ArmPose) {
         out.status = if self.ever_valid || self.hold_flags != 0 { ArmStatus::Fallback } else { ArmStatus::Starting } as u32;
         out.flags |= flags;
@@ -658,6 +600,9 @@ impl<E: Estimator> Arm<E> {
         out.correction_um = [0.0; 3];
         out.corrected_position_um = out.raw_position_um;
         out.bound95_um = [f64::NAN; 3];
+        out.rotation_deg = [0.0; 3];
+        out.corrected_orientation = out.orientation;
+        out.rotation_bound95_deg = [f64::NAN; 3];
     }
 
     fn disconnect(&mut self, limits: &Limits) -> ArmPose {
@@ -667,8 +612,7 @@ impl<E: Estimator> Arm<E> {
             flags = flag::RESET;
         }
         self.valid = false;
-        self.recovering = false;
-        self.correction_um = Vector3::zeros();
+        self.uncorrect();
         self.hold = limits.good_cycles;
         self.frozen.reset();
         self.forget();
@@ -678,4 +622,14 @@ impl<E: Estimator> Arm<E> {
 
 fn count(counter: &mut u64) {
     *counter = counter.wrapping_add(1);
+}
+
+/// exp(rotation) · orientation, row-major; bit for bit the same where the rotation, degrees, is zero.
+fn turned(orientation: &[f32; 9], rotation_deg: &Vector3<f64>) -> [f32; 9] {
+    if *rotation_deg == Vector3::zeros() {
+        return *orientation;
+    }
+    let by = Rotation3::new(rotation_deg.map(f64::to_radians));
+    let turned = by * Matrix3::from_fn(|row, column| f64::from(orientation[3 * row + column]));
+    std::array::from_fn(|place| turned[(place / 3, place % 3)] as f32)
 }

@@ -8,6 +8,7 @@
 pub mod card;
 pub mod check;
 pub mod config;
+pub mod correction;
 pub mod cycle;
 pub mod frozen;
 pub mod guard;

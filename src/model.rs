@@ -3,7 +3,8 @@
 
 use crate::card::{Card, CardError, Golden};
 use crate::config::{self, ModelSource, shown_path};
-use crate::cycle::{Estimator, Model};
+use crate::correction::Model;
+use crate::cycle::Estimator;
 use crate::guard::Guard;
 use crate::load::{LoadCard, LoadObserver};
 use crate::memory::Memory;
@@ -75,16 +76,20 @@ pub enum ModelError {
         cause: CardError,
     },
     /// Weights of the format asked for are too far off.
-    #[error("{path}: {cause} mm; choose another format, weights = \"auto\", or raise weights_deviation_um")]
+    #[error("{path}: {cause} {unit}; choose another format, weights = \"auto\", or raise {key}")]
     Weights {
         /// The file.
         path: String,
+        /// Of the network's answers.
+        unit: &'static str,
+        /// Of the configuration.
+        key: &'static str,
         /// How far.
         cause: NotExactEnough,
     },
     /// The network does not give what it gave when it was exported.
     #[error(
-        "{path}: golden pair {index}: output {axis} is {found} mm, the card says {expected} mm; card and network do not belong together, export the model again"
+        "{path}: golden pair {index}: output {axis} is {found} {unit}, the card says {expected} {unit}; card and network do not belong together, export the model again"
     )]
     Golden {
         /// The file.
@@ -93,6 +98,8 @@ pub enum ModelError {
         index: usize,
         /// Which output.
         axis: usize,
+        /// Of the network's answers.
+        unit: &'static str,
         /// As computed.
         found: f64,
         /// As stated.
@@ -106,7 +113,7 @@ pub struct Loaded {
     pub model: Model<Estimate>,
     /// What the file's metadata says.
     pub card: Card,
-    /// How far the plan's weights are off, mm.
+    /// How far the plan's weights are off, mm or degrees.
     pub deviation: Deviation,
 }
 
@@ -115,9 +122,10 @@ impl Loaded {
     pub fn weights(&self) -> String {
         let Deviation { worst, inputs, .. } = self.deviation;
         format!(
-            "weights {}, at most {:.2} um from float64 over {inputs} inputs",
+            "weights {}, at most {:.2} {} from float64 over {inputs} inputs",
             self.model.estimator.plan.format(),
-            worst * 1000.0
+            worst * 1000.0,
+            self.card.quantity.thousandth()
         )
     }
 }
@@ -192,12 +200,12 @@ impl Estimator for Estimate {
         self.memory.is_settled()
     }
 
-    fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+    fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]) {
         if self.memory.is_empty() {
-            return self.plan.run(features, error_mm);
+            return self.plan.run(features, error);
         }
         self.see(features);
-        self.plan.run(&self.input, error_mm);
+        self.plan.run(&self.input, error);
     }
 
     fn keep_warm(&mut self) {
@@ -237,23 +245,25 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let network = import(&source.path, &bytes)?;
     drop(bytes);
     let unusable = |cause| ModelError::Card { path: path.clone(), cause };
-    let card = Card::read(&network.metadata).map_err(unusable)?;
+    let card = Card::read(&network.metadata, source.quantity).map_err(unusable)?;
     check_golden(&path, &mut Estimate::new(&network, Plan::new(&network)), &card)?;
     card.check_range().map_err(unusable)?;
     card.check_memory(network.plays.len()).map_err(unusable)?;
     // Places of a memory that has seen nothing else are zero.
     let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len()]].concat();
     let golden: Vec<Vec<f32>> = card.golden.iter().map(seen).collect();
-    let choice = network::choose(&network, &golden, source.weights_deviation_um / 1000.0, source.weights)
-        .map_err(|cause| ModelError::Weights { path: path.clone(), cause })?;
+    let choice = network::choose(&network, &golden, source.weights_deviation / 1000.0, source.weights).map_err(|cause| {
+        ModelError::Weights { path: path.clone(), unit: source.quantity.unit(), key: source.quantity.deviation_key(), cause }
+    })?;
+    let per_output = source.quantity.per_output();
     let model = Model {
         estimator: Estimate::new(&network, choice.plan).watching(card.load.clone()),
         guard: Guard::new(card.domain.clone()),
         allowed: card.allowed.clone(),
         id: u64::from_be_bytes(std::array::from_fn(|index| digest[index])),
-        bound_um: card.bound_mm * 1000.0,
-        bound95_um: card.bound95_mm.map(|mm| mm * 1000.0),
-        bound95_unsettled_um: card.bound95_unsettled_mm.map(|mm| mm * 1000.0),
+        bound: card.bound * per_output,
+        bound95: card.bound95.map(|value| value * per_output),
+        bound95_unsettled: card.bound95_unsettled.map(|value| value * per_output),
         untrained: card.untrained,
     };
     Ok(Loaded { model, card, deviation: choice.deviation })
@@ -306,7 +316,7 @@ fn check_golden(path: &str, estimate: &mut Estimate, card: &Card) -> Result<(), 
         for (axis, (found, expected)) in output.into_iter().map(f64::from).zip(golden.output).enumerate() {
             // Written so that NaN fails.
             if !((found - expected).abs() <= GOLDEN_TOLERANCE * expected.abs().max(1.0)) {
-                return Err(ModelError::Golden { path: path.to_owned(), index, axis, found, expected });
+                return Err(ModelError::Golden { path: path.to_owned(), index, axis, unit: card.quantity.unit(), found, expected });
             }
         }
     }

@@ -1,7 +1,8 @@
 //! `ravenposed`: start, the ordinary thread beside the loop, and the end.
 
-use crate::config::{Config, Wait};
-use crate::cycle::{ArmModel, Cycle};
+use crate::config::{Config, ModelSource, Wait};
+use crate::correction::ArmModel;
+use crate::cycle::{ArmModels, Cycle};
 use crate::histogram::{self, Histograms};
 use crate::model::{self, Estimate};
 use crate::realtime::{self, Missing};
@@ -95,7 +96,7 @@ fn test_hook(text: &str) -> Result<TestHook, String> {
 
 /// Everything that is prepared before any thread starts.
 struct Prepared {
-    models: [ArmModel<Estimate>; ARMS],
+    models: [ArmModels<Estimate>; ARMS],
     names: [String; ARMS],
 }
 
@@ -157,37 +158,42 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::f
 }
 
 fn load_models(config: &Config) -> Result<Prepared, String> {
-    let mut names = [String::new(), String::new()];
-    let mut models = [ArmModel::None, ArmModel::None];
+    let mut names = [Vec::new(), Vec::new()];
+    let none = || ArmModels::from(ArmModel::None);
+    let mut models = [none(), none()];
     for arm in 0..ARMS {
-        let Some(source) = &config.models[arm] else { continue };
-        match model::load(source) {
-            Ok(loaded) => {
-                let weights = loaded.weights();
-                names[arm] = format!("{:016x} {}, {weights}", loaded.model.id, source.path.display());
-                let card = &loaded.card;
-                say(&format!("{} arm: {weights}; {}", NAMES[arm], card.limits()));
-                if card.untrained && config.allow_untrained {
-                    say(&format!(
-                        "{} arm: the model is UNTRAINED; allow_untrained = true publishes its numbers all the same",
-                        NAMES[arm]
-                    ));
-                } else if card.untrained {
-                    say(&format!("{} arm: the model is untrained; every pose will be fallback(untrained)", NAMES[arm]));
-                }
-                models[arm] = ArmModel::Loaded(Box::new(loaded.model));
-            }
-            Err(error) if config.allow_degraded => {
-                say(&format!("{} arm: {error}; going on without it, as allow_degraded says", NAMES[arm]));
-                models[arm] = ArmModel::Rejected;
-            }
-            Err(error) => return Err(error.to_string()),
+        let Some(sources) = &config.models[arm] else { continue };
+        models[arm].position = load_model(config, &sources.position, NAMES[arm], &mut names[arm])?;
+        if let Some(source) = &sources.orientation {
+            models[arm].orientation = load_model(config, source, &format!("orientation of the {}", NAMES[arm]), &mut names[arm])?;
         }
     }
     if config.models.iter().all(Option::is_none) {
         say("no model is configured; every pose will be fallback(no_model)");
     }
-    Ok(Prepared { models, names })
+    Ok(Prepared { models, names: names.map(|names: Vec<String>| names.join("; orientation ")) })
+}
+
+fn load_model(config: &Config, source: &ModelSource, whose: &str, names: &mut Vec<String>) -> Result<ArmModel<Estimate>, String> {
+    match model::load(source) {
+        Ok(loaded) => {
+            let weights = loaded.weights();
+            names.push(format!("{:016x} {}, {weights}", loaded.model.id, source.path.display()));
+            let card = &loaded.card;
+            say(&format!("{whose} arm: {weights}; {}", card.limits()));
+            if card.untrained && config.allow_untrained {
+                say(&format!("{whose} arm: the model is UNTRAINED; allow_untrained = true publishes its numbers all the same"));
+            } else if card.untrained {
+                say(&format!("{whose} arm: the model is untrained; every pose will be fallback(untrained)"));
+            }
+            Ok(ArmModel::Loaded(Box::new(loaded.model)))
+        }
+        Err(error) if config.allow_degraded => {
+            say(&format!("{whose} arm: {error}; going on without it, as allow_degraded says"));
+            Ok(ArmModel::Rejected)
+        }
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 type Loop = JoinHandle<Result<Box<Histograms>, String>>;

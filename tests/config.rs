@@ -3,7 +3,8 @@
 mod common;
 
 use common::TempDir;
-use ravenpose::config::{Config, ModelSource, Wait};
+use ravenpose::config::{ArmSources, Config, ModelSource, Wait};
+use ravenpose::correction::{Pace, Quantity};
 use ravenpose::network::Format;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use std::process::{Command, Output};
 const BINARY: &str = env!("CARGO_BIN_EXE_ravenposed");
 const TOP: &str = "allow_untrained, allow_degraded, transport, loop, limits, gold, green, report";
 const LOOP: &str = "core, priority, wait, spin_us, keep_warm, hold_cpu_dma_latency, lock_memory";
-const LIMITS: &str = "period_us, stale_us, budget_us, good_cycles, recover_um_per_cycle, rate_um_per_cycle, envelope_mm, late_degraded, late_fallback";
+const LIMITS: &str = "period_us, stale_us, budget_us, good_cycles, recover_um_per_cycle, rate_um_per_cycle, envelope_mm, recover_deg_per_cycle, rate_deg_per_cycle, envelope_deg, late_degraded, late_fallback";
 const SYNTAX: &str = "write key = value, text in double quotes, tables as [name]";
 const VALUE: &str = "the value is missing, followed by something else, or text without quotes";
 
@@ -38,11 +39,11 @@ const UNKNOWN: [(&str, &str); 14] = [
     ),
     (
         "[gold]\nmodell = \"a.onnx\"",
-        ":2:1: unknown key `modell` in [gold] (did you mean `model`?); allowed here: model, sha256, weights, weights_deviation_um",
+        ":2:1: unknown key `modell` in [gold] (did you mean `model`?); allowed here: orientation, model, sha256, weights, weights_deviation_um",
     ),
     (
         "[green]\nmodel = \"a.onnx\"\nsha265 = \"\"",
-        ":3:1: unknown key `sha265` in [green] (did you mean `sha256`?); allowed here: model, sha256, weights, weights_deviation_um",
+        ":3:1: unknown key `sha265` in [green] (did you mean `sha256`?); allowed here: orientation, model, sha256, weights, weights_deviation_um",
     ),
     (
         "[report]\ninterval = 60",
@@ -82,7 +83,7 @@ const WRONG_TYPE: [(&str, &str); 21] = [
     ("[report]\ninterval_s = 1e3", ":2:14: report.interval_s = 1e3 must be a whole number from 1 to 86400"),
 ];
 
-const WRONG_VALUE: [(&str, &str); 22] = [
+const WRONG_VALUE: [(&str, &str); 27] = [
     ("[limits]\nstale_us = 1000", ":2:12: limits.stale_us = 1000 must be longer than limits.period_us = 1000"),
     ("[limits]\nperiod_us = 800\nstale_us = 500", ":3:12: limits.stale_us = 500 must be longer than limits.period_us = 800"),
     ("[limits]\nperiod_us = 8_000", ":2:13: limits.stale_us = 5000 (the default) must be longer than limits.period_us = 8000"),
@@ -121,6 +122,23 @@ const WRONG_VALUE: [(&str, &str); 22] = [
     (
         "[gold]\nmodel = \"a.onnx\"\nweights_deviation_um = 0",
         ":3:24: gold.weights_deviation_um = 0 must be a number from 0.001 to 1000",
+    ),
+    (
+        "[gold]\nmodel = \"a.onnx\"\n[gold.orientation]\nmodel = \"b.onnx\"\nweights_deviation_um = 1",
+        ":5:1: unknown key `weights_deviation_um` in [gold.orientation] (did you mean `weights_deviation_mdeg`?); allowed here: model, sha256, weights, weights_deviation_mdeg",
+    ),
+    (
+        "[gold]\nmodel = \"a.onnx\"\n[gold.orientation]\nmodel = 3",
+        ":4:9: gold.orientation.model = 3 must be a path without control characters, in quotes",
+    ),
+    ("[gold]\n[gold.orientation]\nmodel = \"b.onnx\"", ":1:1: gold.model is missing; add model = \"FILE.onnx\" to [gold]"),
+    (
+        "[gold]\nmodel = \"a.onnx\"\n[gold.orientation]",
+        ":3:1: gold.orientation.model is missing; add model = \"FILE.onnx\" to [gold.orientation]",
+    ),
+    (
+        "[gold]\nmodel = \"a.onnx\"\norientation = \"b.onnx\"",
+        ":3:15: gold.orientation = \"b.onnx\" must be a table, written [gold.orientation] once",
     ),
     ("[gold]\nmodel = \"\"", ":2:9: gold.model = \"\" must be a path without control characters, in quotes"),
     ("[gold]\nmodel = \"a\\u0007\"", ":2:9: gold.model = \"a\\u0007\" must be a path without control characters, in quotes"),
@@ -163,7 +181,7 @@ const WRONG_BYTES: [(&[u8], &str); 6] = [
 ];
 
 /// Table, key, a number just too small, one just too large, and what is wanted. Every number of the configuration is here.
-const RANGES: [(&str, &str, &str, &str, &str); 13] = [
+const RANGES: [(&str, &str, &str, &str, &str); 16] = [
     ("loop", "core", "-1", "4096", "a whole number from 0 to 4095"),
     ("loop", "priority", "0", "96", "a whole number from 1 to 95"),
     ("loop", "spin_us", "-1", "901", "a whole number from 0 to 900"),
@@ -174,6 +192,9 @@ const RANGES: [(&str, &str, &str, &str, &str); 13] = [
     ("limits", "recover_um_per_cycle", "0.009", "1000.1", "a number from 0.01 to 1000"),
     ("limits", "rate_um_per_cycle", "0", "15000.1", "a number from 0.01 to 15000"),
     ("limits", "envelope_mm", "-10", "50.1", "a number from 0.01 to 50"),
+    ("limits", "recover_deg_per_cycle", "0", "2.1", "a number from 0.0001 to 2"),
+    ("limits", "rate_deg_per_cycle", "0", "90.1", "a number from 0.0001 to 90"),
+    ("limits", "envelope_deg", "0", "90.1", "a number from 0.01 to 90"),
     ("limits", "late_degraded", "0", "1001", "a whole number from 1 to 1000"),
     ("limits", "late_fallback", "0", "1001", "a whole number from 1 to 1000"),
     ("report", "interval_s", "0", "86401", "a whole number from 1 to 86400"),
@@ -202,6 +223,9 @@ good_cycles = 50
 recover_um_per_cycle = 5
 rate_um_per_cycle = 80.5
 envelope_mm = 12.5
+recover_deg_per_cycle = 0.01
+rate_deg_per_cycle = 0.5
+envelope_deg = 20
 late_degraded = 2
 late_fallback = 7
 [gold]
@@ -209,6 +233,11 @@ model = "gold.onnx"
 sha256 = "ABCDEF0123456789abcdef0123456789abcdef0123456789abcdef0123456789"
 weights = "f16"
 weights_deviation_um = 2.5
+[gold.orientation]
+model = "gold-orientation.onnx"
+sha256 = "00CDEF0123456789abcdef0123456789abcdef0123456789abcdef0123456789"
+weights = "i16"
+weights_deviation_mdeg = 4
 [green]
 model = "/srv/green.onnx"
 weights = "auto"
@@ -386,11 +415,21 @@ fn every_key_is_read() {
     let limits = config.limits;
     assert_eq!((limits.period_ns, limits.stale_ns, limits.budget_ns), (2_000_000, 6_000_000, 300_000));
     assert_eq!((limits.good_cycles, limits.late_degraded, limits.late_fallback), (50, 2, 7));
-    assert_eq!((limits.recover_um, limits.rate_um, limits.envelope_um), (5.0, 80.5, 12_500.0));
+    assert_eq!(limits.position, Pace { recover: 5.0, rate: 80.5, envelope: 12_500.0 });
+    assert_eq!(limits.orientation, Pace { recover: 0.01, rate: 0.5, envelope: 20.0 });
     let sha256 = Some("abcdef0123456789abcdef0123456789abcdef0123456789abcdef0123456789".to_owned());
-    let gold = ModelSource { path: directory.0.join("gold.onnx"), sha256, weights: Some(Format::F16), weights_deviation_um: 2.5 };
-    assert_eq!(config.models[0], Some(gold));
-    assert_eq!(config.models[1], Some(ModelSource::new(PathBuf::from("/srv/green.onnx"))));
+    let weights = Some(Format::F16);
+    let position = ModelSource { sha256, weights, weights_deviation: 2.5, ..ModelSource::new(directory.0.join("gold.onnx")) };
+    let orientation = ModelSource {
+        path: directory.0.join("gold-orientation.onnx"),
+        sha256: Some("00cdef0123456789abcdef0123456789abcdef0123456789abcdef0123456789".to_owned()),
+        weights: Some(Format::I16),
+        weights_deviation: 4.0,
+        quantity: Quantity::Orientation,
+    };
+    assert_eq!(config.models[0], Some(ArmSources { position, orientation: Some(orientation) }));
+    let position = ModelSource::new(PathBuf::from("/srv/green.onnx"));
+    assert_eq!(config.models[1], Some(ArmSources { position, orientation: None }));
     assert_eq!(config.runtime_dir, directory.0.join("run"));
     assert_eq!(config.histogram_dir, Some(directory.0.join("../histograms")));
     assert_eq!(config.interval_s, 10);

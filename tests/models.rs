@@ -6,8 +6,9 @@ mod onnx;
 
 use common::{Rng, TempDir};
 use onnx::{Onnx, Small, words};
-use ravenpose::card::{Card, UNITS};
+use ravenpose::card::Card;
 use ravenpose::config::ModelSource;
+use ravenpose::correction::Quantity;
 use ravenpose::cycle::Model;
 use ravenpose::model::{self, Estimate};
 use ravenpose::network::Format;
@@ -33,7 +34,11 @@ fn hash(bytes: &[u8]) -> String {
 
 /// Loads a file; a refusal must be one printable line that begins with the file.
 fn load(path: &Path, sha256: Option<String>) -> Result<(Model<Estimate>, Card), String> {
-    let source = ModelSource { sha256, ..ModelSource::new(path.to_owned()) };
+    load_as(path, sha256, Quantity::Position)
+}
+
+fn load_as(path: &Path, sha256: Option<String>, quantity: Quantity) -> Result<(Model<Estimate>, Card), String> {
+    let source = ModelSource { sha256, quantity, ..ModelSource::new(path.to_owned()) };
     model::load(&source).map(|loaded| (loaded.model, loaded.card)).map_err(|error| {
         let line = error.to_string();
         assert!(!line.contains(|c: char| c.is_control() || c == '\u{202e}'), "{line:?}");
@@ -340,8 +345,8 @@ fn a_trained_model_loads_with_everything_that_its_card_states() {
     let directory = TempDir::new("models-trained");
     let (model, card) = load_bytes(&directory, &small().trained().bytes()).expect("a trained model");
     assert!(!card.untrained && !model.untrained);
-    assert_eq!((card.bound_mm, card.bound95_mm), (12.5, [1.0, 2.0, 3.0]));
-    assert_eq!((model.bound_um, model.bound95_um), (12_500.0, [1000.0, 2000.0, 3000.0]));
+    assert_eq!((card.bound, card.bound95), (12.5, [1.0, 2.0, 3.0]));
+    assert_eq!((model.bound, model.bound95), (12_500.0, [1000.0, 2000.0, 3000.0]));
     assert_eq!(card.golden.len(), 4);
     // Pedal down, unless it says otherwise; any board.
     assert_eq!((card.allowed.runlevels.as_slice(), card.allowed.boards.as_slice()), (&[3][..], &[][..]));
@@ -368,7 +373,7 @@ fn an_untrained_model_needs_no_card() {
         assert!(model.untrained && card.untrained, "{case}");
     }
     let (_, card) = load_bytes(&directory, &small().onnx().bytes()).expect("no metadata");
-    assert!(card.domain.is_none() && card.golden.is_empty() && card.bound95_mm.iter().all(|bound| bound.is_nan()));
+    assert!(card.domain.is_none() && card.golden.is_empty() && card.bound95.iter().all(|bound| bound.is_nan()));
 }
 
 #[test]
@@ -441,21 +446,55 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
 }
 
 #[test]
+fn a_model_corrects_the_quantity_that_it_was_trained_for_and_no_other() {
+    let directory = TempDir::new("models-quantity");
+    let (position, orientation) = (Quantity::Position.units(), Quantity::Orientation.units());
+    let load = |onnx: &Onnx, quantity| {
+        let bytes = onnx.bytes();
+        load_as(&directory.file("model.onnx", &bytes), Some(hash(&bytes)), quantity)
+    };
+    let turning = || {
+        small()
+            .trained()
+            .set("ravenpose.units", orientation)
+            .set("ravenpose.correction_bound_deg", "7.5")
+            .set("ravenpose.bound95_deg", "0.1 0.2 0.3")
+    };
+    let (model, card) = load(&turning(), Quantity::Orientation).expect("a model of the orientation");
+    assert_eq!((card.quantity, card.bound, card.bound95), (Quantity::Orientation, 7.5, [0.1, 0.2, 0.3].map(|x: f32| f64::from(x))));
+    assert_eq!((model.bound, model.bound95), (card.bound, card.bound95), "degrees stay degrees");
+    let mixed = |onnx: &Onnx, quantity, found: &str, expected: &str| {
+        let line = load(onnx, quantity).err().expect("another quantity");
+        assert_eq!(
+            line,
+            format!("property ravenpose.units is {found:?}, expected {expected:?}; export the model again with this ravenpose")
+        );
+    };
+    mixed(&turning(), Quantity::Position, orientation, position);
+    mixed(&small().trained(), Quantity::Orientation, position, orientation);
+    let negative = turning().set("ravenpose.bound95_deg", "1 -2 3");
+    assert_eq!(
+        load(&negative, Quantity::Orientation).err().expect("refused"),
+        "property ravenpose.bound95_deg: -2 is not a half width"
+    );
+}
+
+#[test]
 fn another_layout_or_unit_is_refused_with_expected_and_found() {
     let directory = TempDir::new("models-units");
     let long = "x".repeat(5000);
     let cases = [
         ("ravenpose.feature_layout", "raven118-v2", "\"raven118-v2\"", features::LAYOUT),
         ("ravenpose.feature_layout", "", "\"\"", features::LAYOUT),
-        ("ravenpose.units", "SI", "\"SI\"", UNITS),
+        ("ravenpose.units", "SI", "\"SI\"", Quantity::Position.units()),
         (
             "ravenpose.units",
             "raven_state as published; position error in m",
             "\"raven_state as published; position error in m\"",
-            UNITS,
+            Quantity::Position.units(),
         ),
-        ("ravenpose.units", "mm\n\u{1b}[2J\u{202e}", "\"mm[2J\\u{202e}\"", UNITS),
-        ("ravenpose.units", &long, &format!("\"{}\"", &long[..60]), UNITS),
+        ("ravenpose.units", "mm\n\u{1b}[2J\u{202e}", "\"mm[2J\\u{202e}\"", Quantity::Position.units()),
+        ("ravenpose.units", &long, &format!("\"{}\"", &long[..60]), Quantity::Position.units()),
     ];
     for (key, value, found, expected) in cases {
         for onnx in [small().trained(), small().onnx()] {
@@ -491,8 +530,8 @@ fn unusable_numbers_are_refused_with_the_property_and_the_problem() {
         ("domain_limit", "-1".to_owned(), "-1 is not a positive distance"),
         ("domain_limit", "1 2".to_owned(), "2 numbers, expected 1"),
         ("domain_limit", "NaN".to_owned(), "\"NaN\" is not a finite number"),
-        ("correction_bound_mm", "-1".to_owned(), "-1 is not a positive length"),
-        ("correction_bound_mm", "0".to_owned(), "0 is not a positive length"),
+        ("correction_bound_mm", "-1".to_owned(), "-1 is not positive"),
+        ("correction_bound_mm", "0".to_owned(), "0 is not positive"),
         ("correction_bound_mm", "15 mm".to_owned(), "\"mm\" is not a number"),
         ("correction_bound_mm", String::new(), "0 numbers, expected 1"),
         ("correction_bound_mm", "inf".to_owned(), "\"inf\" is not a finite number"),
@@ -658,8 +697,8 @@ fn a_flipped_bit_under_a_right_hash_gives_a_model_or_one_line() {
 
 #[test]
 fn the_smallest_weights_that_are_exact_enough_are_chosen_and_a_format_that_is_not_is_refused() {
-    let with = |weights, weights_deviation_um| {
-        let source = ModelSource { weights, weights_deviation_um, ..ModelSource::new(common::untrained()) };
+    let with = |weights, weights_deviation| {
+        let source = ModelSource { weights, weights_deviation, ..ModelSource::new(common::untrained()) };
         model::load(&source)
             .map(|loaded| (loaded.model.estimator.plan().format(), loaded.deviation.worst * 1000.0, loaded.weights()))
     };

@@ -22,11 +22,15 @@ fn number(value: f64) -> Value {
 
 fn arm(pose: &ArmPose) -> Value {
     let vector = |values: [f64; 3]| Value::Array(values.into_iter().map(number).collect());
+    let matrix = |values: [f32; 9]| values.map(|value| number(f64::from(value)));
     json!({
         "status": pose.status, "flags": pose.flags, "model_id": pose.model_id, "reset_count": pose.reset_count,
         "domain_score": number(f64::from(pose.domain_score)), "raw_position_um": vector(pose.raw_position_um),
         "correction_um": vector(pose.correction_um), "corrected_position_um": vector(pose.corrected_position_um),
-        "bound95_um": vector(pose.bound95_um), "orientation": pose.orientation.map(|value| number(f64::from(value))), "hold_cycles": pose.hold_cycles,
+        "bound95_um": vector(pose.bound95_um), "orientation": matrix(pose.orientation), "hold_cycles": pose.hold_cycles,
+        "orientation_model_id": pose.orientation_model_id, "rotation_deg": vector(pose.rotation_deg),
+        "rotation_bound95_deg": vector(pose.rotation_bound95_deg), "corrected_orientation": matrix(pose.corrected_orientation),
+        "reserved": pose.reserved,
     })
 }
 

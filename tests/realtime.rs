@@ -7,7 +7,7 @@ mod proof;
 
 use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, nothing_happens, role, thread_id};
 use ravenpose::config::{ModelSource, Wait};
-use ravenpose::cycle::{ArmModel, Cycle, Limits};
+use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Limits};
 use ravenpose::load::{self, LoadCard};
 use ravenpose::memory::Play;
 use ravenpose::model::Estimate;
@@ -58,7 +58,8 @@ fn remembering() -> ArmModel<Estimate> {
 
 fn runner(settings: &Settings, wait: Wait) -> (Runner<Estimate>, histogram::Collector, shared::EventReceiver, Arc<Shared>) {
     let limits = Limits::default();
-    let cycle = Cycle::new(limits, [untrained(), remembering()], true, 0);
+    let gold = ArmModels { position: untrained(), orientation: remembering() };
+    let cycle = Cycle::new(limits, [gold, remembering().into()], true, 0);
     let (recorder, collector) = histogram::exchange();
     let (sender, events) = shared::events();
     let shown = Arc::new(Shared::default());

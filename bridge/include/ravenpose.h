@@ -3,7 +3,8 @@
  * Generated from bridge/src/lib.rs and wire/src by bridge/tests/header.rs: do not edit.
  *
  * Consumer rule: use the corrected position only if the layout version matches, the sequence has advanced, the age is below
- * RAVENPOSE_POSE_AGE_MAX_NS and the status is RAVENPOSE_STATUS_VALID; otherwise use the raw position. ravenpose_position() does this.
+ * RAVENPOSE_POSE_AGE_MAX_NS and the status is RAVENPOSE_STATUS_VALID; otherwise use the raw position. ravenpose_position() and
+ * ravenpose_orientation() do this.
  *
  * Pointers may be null (an error code); otherwise they must be valid. A handle may be used by any thread, one at a time.
  */
@@ -326,6 +327,26 @@ typedef struct ravenpose_arm_pose {
    Good cycles still wanted before the correction returns.
    */
   uint32_t hold_cycles;
+  /*
+   As `model_id`, of the model that corrects the orientation; 0 without one: then it is RAVEN's own in every status.
+   */
+  uint64_t orientation_model_id;
+  /*
+   What the orientation was turned by, a rotation vector in the axes of frame 0, degrees; zero unless `status` is valid.
+   */
+  double rotation_deg[3];
+  /*
+   Half width per axis of `rotation_deg` that holds the true rotation with 95 %, degrees; NaN while the model states none.
+   */
+  double rotation_bound95_deg[3];
+  /*
+   `exp(rotation_deg)` times `orientation`, row-major; bit for bit `orientation` where the rotation is zero.
+   */
+  float corrected_orientation[9];
+  /*
+   Zero.
+   */
+  uint32_t reserved;
 } ravenpose_arm_pose;
 
 /*
@@ -516,6 +537,11 @@ int32_t ravenpose_position(const struct ravenpose_pose *pose,
                            uint32_t arm,
                            int64_t now_ns,
                            double *position_um);
+
+/*
+ The same for the orientation: nine numbers, row-major. `RAVENPOSE_OK` only where a model corrects the orientation, too.
+ */
+int32_t ravenpose_orientation(const struct ravenpose_pose *pose, uint32_t arm, int64_t now_ns, float *orientation);
 
 /*
  Number of arms in a pose.

@@ -80,6 +80,12 @@ struct Position {
   bool corrected;            // false: this is the raw position
 };
 
+// The rotation of one arm by the consumer rule.
+struct Orientation {
+  std::array<float, 9> matrix;  // row-major, frame 0 of the arm
+  bool corrected;               // false: this is RAVEN's own
+};
+
 class PoseReader {
  public:
   explicit PoseReader(const Options &options = {})
@@ -110,6 +116,14 @@ class PoseReader {
 inline std::optional<Position> position(const ravenpose_pose &pose, uint32_t arm, int64_t now_ns) noexcept {
   Position result{};
   const int32_t code = ravenpose_position(&pose, arm, now_ns, result.um.data());
+  if (code < 0) return std::nullopt;
+  result.corrected = code == RAVENPOSE_OK;
+  return result;
+}
+
+inline std::optional<Orientation> orientation(const ravenpose_pose &pose, uint32_t arm, int64_t now_ns) noexcept {
+  Orientation result{};
+  const int32_t code = ravenpose_orientation(&pose, arm, now_ns, result.matrix.data());
   if (code < 0) return std::nullopt;
   result.corrected = code == RAVENPOSE_OK;
   return result;

@@ -18,7 +18,7 @@ pub use handle::{PoseReader, Publisher};
 
 use handle::guarded;
 use ravenpose_transport::Settings;
-use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, RavenState};
+use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, RavenState};
 use std::ffi::{CStr, c_char};
 
 /// Version of this interface. `ravenpose_*_open` refuses a caller that was compiled against another one.
@@ -289,19 +289,42 @@ pub unsafe extern "C" fn ravenpose_pose_reader_close(reader: *mut *mut PoseReade
 pub unsafe extern "C" fn ravenpose_position(pose: *const CorrectedPose, arm: u32, now_ns: i64, position_um: *mut f64) -> i32 {
     // SAFETY: the caller gives null or a valid pose.
     let (Some(pose), false) = (unsafe { pose.as_ref() }, position_um.is_null()) else { return Code::Null as i32 };
-    let Some(estimate) = pose.arm.get(arm as usize) else { return Code::Argument as i32 };
-    if pose.admit().is_err() {
-        return Code::Torn as i32;
-    }
-    if estimate.status == ArmStatus::Absent as u32 {
-        return Code::Absent as i32;
-    }
-    let fresh = now_ns.saturating_sub(pose.source_time_ns) < RAVENPOSE_POSE_AGE_MAX_NS;
-    let usable = fresh && estimate.status == ArmStatus::Valid as u32;
+    let (estimate, usable) = match consume(pose, arm, now_ns) {
+        Ok(found) => found,
+        Err(code) => return code as i32,
+    };
     let position = if usable { &estimate.corrected_position_um } else { &estimate.raw_position_um };
     // SAFETY: the caller gives room for three numbers.
     unsafe { std::ptr::copy_nonoverlapping(position.as_ptr(), position_um, 3) };
     if usable { Code::Ok as i32 } else { Code::Raw as i32 }
+}
+
+/// The same for the orientation: nine numbers, row-major. `RAVENPOSE_OK` only where a model corrects the orientation, too.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn ravenpose_orientation(pose: *const CorrectedPose, arm: u32, now_ns: i64, orientation: *mut f32) -> i32 {
+    // SAFETY: the caller gives null or a valid pose.
+    let (Some(pose), false) = (unsafe { pose.as_ref() }, orientation.is_null()) else { return Code::Null as i32 };
+    let (estimate, usable) = match consume(pose, arm, now_ns) {
+        Ok((estimate, usable)) => (estimate, usable && estimate.orientation_model_id != 0),
+        Err(code) => return code as i32,
+    };
+    let found = if usable { &estimate.corrected_orientation } else { &estimate.orientation };
+    // SAFETY: the caller gives room for nine numbers.
+    unsafe { std::ptr::copy_nonoverlapping(found.as_ptr(), orientation, 9) };
+    if usable { Code::Ok as i32 } else { Code::Raw as i32 }
+}
+
+/// An arm's estimate, and whether the consumer rule lets it be used at the time `now_ns`.
+fn consume(pose: &CorrectedPose, arm: u32, now_ns: i64) -> Result<(&ArmPose, bool), Code> {
+    let Some(estimate) = pose.arm.get(arm as usize) else { return Err(Code::Argument) };
+    if pose.admit().is_err() {
+        return Err(Code::Torn);
+    }
+    if estimate.status == ArmStatus::Absent as u32 {
+        return Err(Code::Absent);
+    }
+    let fresh = now_ns.saturating_sub(pose.source_time_ns) < RAVENPOSE_POSE_AGE_MAX_NS;
+    Ok((estimate, fresh && estimate.status == ArmStatus::Valid as u32))
 }
 
 /// Number of arms in a pose.

@@ -144,7 +144,12 @@ fn rust_layouts() -> [Layout; 3] {
                 corrected_position_um,
                 bound95_um,
                 orientation,
-                hold_cycles
+                hold_cycles,
+                orientation_model_id,
+                rotation_deg,
+                rotation_bound95_deg,
+                corrected_orientation,
+                reserved
             ),
         ),
     ]

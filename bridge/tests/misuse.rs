@@ -53,6 +53,9 @@ fn null_is_refused_everywhere() {
         assert_eq!(ravenpose_state_init(null_mut()), missing);
         assert_eq!(ravenpose_position(null(), 0, 0, um.as_mut_ptr()), missing);
         assert_eq!(ravenpose_position(&raw const pose, 0, 0, null_mut()), missing);
+        let mut matrix = [0.0; 9];
+        assert_eq!(ravenpose_orientation(null(), 0, 0, matrix.as_mut_ptr()), missing);
+        assert_eq!(ravenpose_orientation(&raw const pose, 0, 0, null_mut()), missing);
     }
 }
 
@@ -155,6 +158,22 @@ fn the_consumer_rule_gives_raw_unless_everything_is_right() {
     let mut torn = good;
     torn.guard_tail = 4;
     assert_eq!(rule(&torn, 0, 1_000_000_001).0, Code::Torn as i32);
+
+    let mut turned = good;
+    turned.arm[0].orientation[0] = 1.0;
+    turned.arm[0].corrected_orientation[0] = 2.0;
+    let rule = |pose: &CorrectedPose, now: i64| {
+        let mut matrix = [0.0; 9];
+        // SAFETY: valid pointers.
+        let code = unsafe { ravenpose_orientation(pose, 0, now, matrix.as_mut_ptr()) };
+        (code, matrix[0])
+    };
+    assert_eq!(rule(&turned, 1_004_999_999), (Code::Raw as i32, 1.0), "no model turned it");
+    turned.arm[0].orientation_model_id = 9;
+    assert_eq!(rule(&turned, 1_004_999_999), (Code::Ok as i32, 2.0));
+    assert_eq!(rule(&turned, 1_005_000_000), (Code::Raw as i32, 1.0), "too old");
+    turned.arm[0].status = ArmStatus::Absent as u32;
+    assert_eq!(rule(&turned, 1_004_999_999).0, Code::Absent as i32);
 }
 
 #[test]

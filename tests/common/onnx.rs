@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 use super::common::{Rng, untrained};
-use ravenpose::card::UNITS;
+use ravenpose::correction::Quantity;
 use ravenpose_wire::{FEATURES, features};
 use std::fmt::Write;
 
@@ -233,7 +233,7 @@ impl Small {
             .collect();
         self.onnx()
             .set("ravenpose.feature_layout", features::LAYOUT)
-            .set("ravenpose.units", UNITS)
+            .set("ravenpose.units", Quantity::Position.units())
             .set("ravenpose.trained_on", "a recording")
             .set("ravenpose.feature_min", words(&[-2.0; FEATURES]))
             .set("ravenpose.feature_max", words(&[2.0; FEATURES]))

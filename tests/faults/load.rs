@@ -1,6 +1,7 @@
 //! What the pose says while the estimator sees a load that the model was not trained with.
 
 use crate::world::{MS, state};
+use ravenpose::correction::Pace;
 use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
 use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, flag};
@@ -27,8 +28,8 @@ impl Estimator for Scale {
         self.0 > 0.0
     }
 
-    fn run(&mut self, _features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
-        *error_mm = [0.0, 0.0, 1.0];
+    fn run(&mut self, _features: &[f32; FEATURES], error: &mut [f32; 3]) {
+        *error = [0.0, 0.0, 1.0];
     }
 }
 
@@ -48,12 +49,12 @@ impl Bench {
             guard: Guard::new(Some(domain)),
             allowed: Allowed { runlevels: vec![3], boards: Vec::new() },
             id: 1,
-            bound_um: 8_000.0,
-            bound95_um: [300.0; 3],
-            bound95_unsettled_um: [f64::NAN; 3],
+            bound: 8_000.0,
+            bound95: [300.0; 3],
+            bound95_unsettled: [f64::NAN; 3],
             untrained: false,
         };
-        let limits = Limits { recover_um: 1e6, rate_um: 1e6, ..Limits::default() };
+        let limits = Limits { position: Pace { recover: 1e6, rate: 1e6, envelope: 15_000.0 }, ..Limits::default() };
         let cycle = Cycle::new(limits, [ArmModel::Loaded(Box::new(model)), ArmModel::None], false, 0);
         Self { cycle, pose: CorrectedPose::new(), step: 0 }
     }

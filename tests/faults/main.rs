@@ -6,5 +6,6 @@ mod common;
 mod load;
 mod memory;
 mod mix;
+mod orientation;
 mod rows;
 mod world;

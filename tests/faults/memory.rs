@@ -1,6 +1,7 @@
 //! What an estimator with a memory is told to follow and to forget, and what the pose says meanwhile.
 
 use crate::world::{MS, state};
+use ravenpose::correction::Pace;
 use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
 use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
@@ -37,8 +38,8 @@ impl Estimator for Counts {
         self.followed >= SETTLES_AFTER
     }
 
-    fn run(&mut self, _features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
-        *error_mm = [0.0, 0.0, self.followed as f32 * 1e-3];
+    fn run(&mut self, _features: &[f32; FEATURES], error: &mut [f32; 3]) {
+        *error = [0.0, 0.0, self.followed as f32 * 1e-3];
     }
 }
 
@@ -65,15 +66,15 @@ impl Bench {
                 guard: Guard::new(Some(domain())),
                 allowed: Allowed::default(),
                 id: 1,
-                bound_um: 8_000.0,
-                bound95_um: [300.0, 400.0, 500.0],
-                bound95_unsettled_um: [800.0, 900.0, 1000.0],
+                bound: 8_000.0,
+                bound95: [300.0, 400.0, 500.0],
+                bound95_unsettled: [800.0, 900.0, 1000.0],
                 untrained: false,
             };
             if connected { ArmModel::Loaded(Box::new(model)) } else { ArmModel::None }
         };
         // Fast enough that a correction is the estimator's own answer.
-        let limits = Limits { recover_um: 1e6, rate_um: 1e6, ..Limits::default() };
+        let limits = Limits { position: Pace { recover: 1e6, rate: 1e6, envelope: 15_000.0 }, ..Limits::default() };
         let cycle = Cycle::new(limits, [model(true), model(false)], false, 0);
         Self { cycle, pose: CorrectedPose::new(), step: 0, now: 1_000 * MS, source: 7 }
     }

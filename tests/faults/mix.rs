@@ -5,7 +5,8 @@
 #![expect(clippy::large_types_passed_by_value, reason = "messages are handed on as the link does")]
 
 use crate::common::Rng;
-use crate::world::{BOUND_UM, Fake, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, cycle, state};
+use crate::world::{BOUND_DEG, BOUND_UM, Fake, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, TURN_HUGE, TURN_NAN, cycle, state};
+use ravenpose::correction::Pace;
 use ravenpose::cycle::{Counters, Cycle, Limits};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag};
 use std::collections::HashMap;
@@ -155,8 +156,8 @@ impl World {
             2 => message.jpos[slot] = value,
             3 => message.jac_f[arm * 6 + self.rng.below(6) as usize] = value,
             4 => message.ori[arm * 9 + self.rng.below(9) as usize] = value,
-            5 => message.dac_val[arm * 8] = OUT_NAN,
-            6 => message.dac_val[arm * 8] = [OUT_INFINITE, OUT_HUGE][self.rng.below(2) as usize],
+            5 => message.dac_val[arm * 8] = [OUT_NAN, TURN_NAN][self.rng.below(2) as usize],
+            6 => message.dac_val[arm * 8] = [OUT_INFINITE, OUT_HUGE, TURN_HUGE][self.rng.below(3) as usize],
             _ => message.pos[arm * 3] = 600_000,
         }
     }
@@ -265,10 +266,13 @@ impl Checker {
         }
         let correction = norm(arm.correction_um);
         assert!(correction <= BOUND_UM);
+        let turned = norm(arm.rotation_deg);
+        assert!(turned <= BOUND_DEG);
         self.reasons |= arm.flags & FALLBACK_REASONS;
         if arm.status == VALID {
             self.valid += 1;
             assert_eq!(arm.flags & FALLBACK_REASONS, 0);
+            assert!(arm.corrected_orientation.iter().all(|x| x.is_finite()));
             assert!(!repeats, "a repeated state is never valid");
             assert!(known.good[index], "a bad state is never corrected");
             let age = pose.publish_time_ns.max(now) - pose.source_time_ns;
@@ -276,7 +280,8 @@ impl Checker {
             assert!(self.good_in_row[index] >= u64::from(limits.good_cycles), "only after enough good cycles");
         } else {
             self.fallbacks += 1;
-            assert_eq!(arm.correction_um, [0.0; 3]);
+            assert_eq!((arm.correction_um, arm.rotation_deg), ([0.0; 3], [0.0; 3]));
+            assert_eq!(arm.corrected_orientation.map(f32::to_bits), arm.orientation.map(f32::to_bits), "NaN and all");
             assert!(arm.flags & FALLBACK_REASONS != 0, "never silence: a reason is given");
             if arm.flags & FALLBACK_REASONS & !(flag::SETTLING | flag::NEW_SOURCE) != 0
                 || (arm.flags & flag::NEW_SOURCE != 0 && arm.flags & flag::SETTLING == 0)
@@ -291,12 +296,19 @@ impl Checker {
             assert_ne!(arm.status, VALID);
         }
         if let Some(before) = before {
-            let step = norm(std::array::from_fn(|axis| arm.correction_um[axis] - before.correction_um[axis]));
+            let step = |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|axis| a[axis] - b[axis]));
             let announced = arm.reset_count != before.reset_count;
-            assert!(!announced || (arm.flags & flag::RESET != 0 && correction == 0.0), "the drop is announced where it happens");
+            assert!(
+                !announced || (arm.flags & flag::RESET != 0 && correction == 0.0 && turned == 0.0),
+                "the drop is announced where it happens"
+            );
             if !announced {
-                let slew = if arm.flags & flag::RECOVERING != 0 { limits.recover_um } else { limits.rate_um };
-                assert!(step <= slew + 1e-6, "step {step} of arm {index}");
+                let slew = |pace: &Pace| if arm.flags & flag::RECOVERING != 0 { pace.recover } else { pace.rate };
+                let steps = [
+                    (step(arm.correction_um, before.correction_um), slew(&limits.position)),
+                    (step(arm.rotation_deg, before.rotation_deg), slew(&limits.orientation)),
+                ];
+                assert!(steps.iter().all(|(step, slew)| *step <= slew * (1.0 + 1e-9)), "steps {steps:?} of arm {index}");
             }
         }
     }

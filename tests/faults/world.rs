@@ -1,6 +1,6 @@
 //! A plausible robot for the pure cycle: states that move within all limits, and an estimator with faults on demand.
 
-use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Estimator, Limits, Model};
 use ravenpose::guard::{Allowed, Guard};
 use ravenpose_wire::{CorrectedPose, FEATURES, RavenState};
 
@@ -9,7 +9,11 @@ pub(crate) const MS: i64 = 1_000_000;
 pub(crate) const OUT_NAN: i32 = 771;
 pub(crate) const OUT_INFINITE: i32 = 772;
 pub(crate) const OUT_HUGE: i32 = 773;
-/// Largest correction of the test model, µm.
+/// The same of the one that corrects the orientation.
+pub(crate) const TURN_NAN: i32 = 774;
+pub(crate) const TURN_HUGE: i32 = 775;
+/// Largest correction of the test models, µm and degrees.
+pub(crate) const BOUND_DEG: f64 = 8.0;
 pub(crate) const BOUND_UM: f64 = 8_000.0;
 
 /// A state of both arms at sample `step`, sent at `time_ns`.
@@ -47,17 +51,22 @@ pub(crate) fn state(source: u64, sequence: u64, step: u64, time_ns: i64) -> Rave
 #[derive(Default)]
 pub(crate) struct Fake {
     pub runs: u64,
+    /// Is it the one that corrects the orientation?
+    pub turns: bool,
 }
 
 impl Estimator for Fake {
-    fn run(&mut self, features: &[f32; FEATURES], error_mm: &mut [f32; 3]) {
+    fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]) {
         self.runs += 1;
         let x = features[0] / 10_000.0;
-        *error_mm = [2.0 * x.sin(), 1.5 * x.cos(), 0.5];
+        *error = [2.0 * x.sin(), 1.5 * x.cos(), 0.5];
         match features[32] as i32 {
-            OUT_NAN => error_mm[1] = f32::NAN,
-            OUT_INFINITE => error_mm[2] = f32::INFINITY,
-            OUT_HUGE => error_mm[0] = 8.5,
+            TURN_NAN if self.turns => error[0] = f32::NAN,
+            TURN_HUGE if self.turns => error[2] = -8.5,
+            _ if self.turns => {}
+            OUT_NAN => error[1] = f32::NAN,
+            OUT_INFINITE => error[2] = f32::INFINITY,
+            OUT_HUGE => error[0] = 8.5,
             _ => {}
         }
     }
@@ -69,15 +78,30 @@ pub(crate) fn model() -> ArmModel<Fake> {
         guard: Guard::new(None),
         allowed: Allowed::default(),
         id: 0x0123_4567_89ab_cdef,
-        bound_um: BOUND_UM,
-        bound95_um: [300.0, 400.0, 500.0],
-        bound95_unsettled_um: [f64::NAN; 3],
+        bound: BOUND_UM,
+        bound95: [300.0, 400.0, 500.0],
+        bound95_unsettled: [f64::NAN; 3],
         untrained: false,
     }))
 }
 
+pub(crate) fn turning() -> ArmModel<Fake> {
+    ArmModel::Loaded(Box::new(Model {
+        estimator: Fake { turns: true, ..Fake::default() },
+        guard: Guard::new(None),
+        allowed: Allowed::default(),
+        id: 0xfedc_ba98_7654_3210,
+        bound: BOUND_DEG,
+        bound95: [0.3, 0.4, 0.5],
+        bound95_unsettled: [f64::NAN; 3],
+        untrained: false,
+    }))
+}
+
+/// Both arms with both models.
 pub(crate) fn cycle(limits: Limits) -> Cycle<Fake> {
-    Cycle::new(limits, [model(), model()], false, 0)
+    let both = || ArmModels { position: model(), orientation: turning() };
+    Cycle::new(limits, [both(), both()], false, 0)
 }
 
 /// The pure cycle with a clock in its hand: one call per period.

@@ -31,6 +31,11 @@ class ArmPose(ctypes.Structure):
         ("bound95_um", ctypes.c_double * 3),
         ("orientation", ctypes.c_float * 9),
         ("hold_cycles", ctypes.c_uint32),
+        ("orientation_model_id", ctypes.c_uint64),
+        ("rotation_deg", ctypes.c_double * 3),
+        ("rotation_bound95_deg", ctypes.c_double * 3),
+        ("corrected_orientation", ctypes.c_float * 9),
+        ("reserved", ctypes.c_uint32),
     ]
 
 

@@ -33,6 +33,16 @@ pub struct ArmPose {
     pub orientation: [f32; 9],
     /// Good cycles still wanted before the correction returns.
     pub hold_cycles: u32,
+    /// As `model_id`, of the model that corrects the orientation; 0 without one: then it is RAVEN's own in every status.
+    pub orientation_model_id: u64,
+    /// What the orientation was turned by, a rotation vector in the axes of frame 0, degrees; zero unless `status` is valid.
+    pub rotation_deg: [f64; 3],
+    /// Half width per axis of `rotation_deg` that holds the true rotation with 95 %, degrees; NaN while the model states none.
+    pub rotation_bound95_deg: [f64; 3],
+    /// `exp(rotation_deg)` times `orientation`, row-major; bit for bit `orientation` where the rotation is zero.
+    pub corrected_orientation: [f32; 9],
+    /// Zero.
+    pub reserved: u32,
 }
 
 impl ArmPose {
@@ -49,6 +59,11 @@ impl ArmPose {
         bound95_um: [f64::NAN; 3],
         orientation: [0.0; 9],
         hold_cycles: 0,
+        orientation_model_id: 0,
+        rotation_deg: [0.0; 3],
+        rotation_bound95_deg: [f64::NAN; 3],
+        corrected_orientation: [0.0; 9],
+        reserved: 0,
     };
 }
 

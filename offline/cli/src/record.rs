@@ -30,13 +30,14 @@ const LOST: u8 = 1;
 /// `CorrectedPose.v1` as a ROS 1 message; the MD5 follows from the text by ROS's rule.
 const POSE: MessageType = MessageType {
     name: "ravenpose/CorrectedPose",
-    md5: "56e473968fe7930a279200d33980f958",
+    md5: "e5cd4e91a993e13e988ee7b776cd1d44",
     definition: "uint64 sequence\nuint64 source_id\nuint64 source_sequence\nint64 source_time_ns\nint64 start_time_ns\n\
 int64 publish_time_ns\nuint32 arms\nint32 runlevel\nuint64 cycles\nuint64 lost\nuint64 skipped\nuint64 duplicates\n\
 uint64 out_of_order\nuint64 refused\nuint64 late\nuint64 overruns\nravenpose/ArmPose gold\nravenpose/ArmPose green\n\
 ================================================================================\nMSG: ravenpose/ArmPose\n\
 uint32 status\nuint32 flags\nuint64 model_id\nuint32 reset_count\nfloat32 domain_score\nfloat64[3] raw_position_um\n\
-float64[3] correction_um\nfloat64[3] corrected_position_um\nfloat64[3] bound95_um\nfloat32[9] orientation\nuint32 hold_cycles\n",
+float64[3] correction_um\nfloat64[3] corrected_position_um\nfloat64[3] bound95_um\nfloat32[9] orientation\nuint32 hold_cycles\n\
+uint64 orientation_model_id\nfloat64[3] rotation_deg\nfloat64[3] rotation_bound95_deg\nfloat32[9] corrected_orientation\n",
 };
 
 /// The one clock: the wall's as it was at the start plus the monotonic time since.
@@ -260,6 +261,11 @@ fn encode_arm(arm: &ArmPose, out: &mut Vec<u8>) {
     }
     out.extend(arm.orientation.iter().flat_map(|value| value.to_le_bytes()));
     out.extend(arm.hold_cycles.to_le_bytes());
+    out.extend(arm.orientation_model_id.to_le_bytes());
+    for vector in [arm.rotation_deg, arm.rotation_bound95_deg] {
+        out.extend(vector.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    out.extend(arm.corrected_orientation.iter().flat_map(|value| value.to_le_bytes()));
 }
 
 #[cfg(test)]

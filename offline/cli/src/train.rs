@@ -3,10 +3,11 @@
 use crate::convert::same_file;
 use crate::output;
 use ::training::commands::{self, Done, Event};
-use ::training::data::{Columns, Reading, Target};
+use ::training::data::{Columns, Reading};
 use ::training::preset::{First, Recipe};
 use arm::Side;
 use clap::Args;
+use ravenpose::correction::Quantity;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -53,7 +54,7 @@ pub(crate) struct Source {
     #[arg(long, default_value = "gold", value_parser = side)]
     arm: Side,
     /// What of the tip is learnt; the service corrects positions alone
-    #[arg(long, default_value = "position", value_parser = Target::NAMES, conflicts_with = "inputs")]
+    #[arg(long, default_value = "position", value_parser = Quantity::NAMES, conflicts_with = "inputs")]
     target: String,
     #[command(flatten)]
     columns: Named,
@@ -81,7 +82,7 @@ impl Source {
             seed: recipe.seed,
             plays: recipe.plays(),
             arm: self.arm,
-            target: Target::of_name(&self.target).unwrap_or_default(),
+            target: Quantity::of_name(&self.target).unwrap_or_default(),
             columns: self.columns.columns(),
         })
     }

@@ -68,7 +68,7 @@ fn the_service_loads_what_was_trained_and_infer_gives_the_golden_outputs() {
         assert!(said.contains("test (1 trajectories"), "{said}");
         let card = model::load(&source(&out)).expect("the service's own checks").card;
         assert!(!card.untrained && card.domain.is_some());
-        assert!(card.bound95_mm.iter().all(|bound| *bound > 0.0));
+        assert!(card.bound95.iter().all(|bound| *bound > 0.0));
         let header: Vec<String> = (0..118).map(|input| format!("in_{input}")).collect();
         let rows: Vec<String> =
             card.golden.iter().map(|pair| pair.input.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")).collect();
@@ -251,7 +251,7 @@ fn the_shipped_model_is_trained_and_the_service_takes_it() {
     let loaded = model::load(&source(&path)).expect("the service's own checks");
     assert!(loaded.model.estimator.remembers());
     let card = loaded.card;
-    for (settled, unsettled) in card.bound95_mm.iter().zip(card.bound95_unsettled_mm) {
+    for (settled, unsettled) in card.bound95.iter().zip(card.bound95_unsettled) {
         assert!(*settled > 0.1 && unsettled > *settled, "{settled} {unsettled}");
     }
     assert!(!card.untrained && card.trained_on.contains("140.0 minutes"), "{}", card.trained_on);

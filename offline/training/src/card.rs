@@ -1,17 +1,15 @@
 //! The model card as metadata: what a network may be used for, in the form that `docs/models.md` lays down.
 
 use crate::chain::Chain;
+use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
-use crate::data::{Target, Trajectory};
 use crate::prepare::Prepared;
-use ravenpose::card::UNITS;
+use ravenpose::correction::Quantity;
 use ravenpose::load::LoadCard;
 use ravenpose_wire::{FEATURES, PEDAL_DOWN, features};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// Units of a model of the orientation: others than the service asks for, whose message passes the reported orientation through.
-const UNITS_OF_ORIENTATION: &str = "raven_state as published; orientation error in deg";
 /// Property: RMS of the vector that is left on the validation trajectories, without the truth's known noise; for `evaluate`.
 pub const VALIDATION_RMS: &str = "ravenpose.validation_rms";
 /// Coverage that the bound is stated for.
@@ -43,7 +41,7 @@ pub struct Facts<'a> {
     /// adds is bounded by itself.
     pub is_raven: bool,
     /// What of a RAVEN-II's tip it gives.
-    pub target: Target,
+    pub target: Quantity,
     /// What it looks at.
     pub prepared: &'a Prepared,
     /// What torque tells about the load, if it does.
@@ -119,23 +117,19 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
     let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
-    let is_raven = facts.is_raven;
+    let (is_raven, unit) = (facts.is_raven, facts.target.unit());
     let settled = bounds(facts.chain, facts.validation);
     put("trained_on", facts.trained_on.to_owned());
     if is_raven {
         put("feature_layout", features::LAYOUT.to_owned());
-        let units = match facts.target {
-            Target::Position => UNITS,
-            Target::Orientation => UNITS_OF_ORIENTATION,
-        };
-        put("units", units.to_owned());
+        put("units", facts.target.units().to_owned());
         put("runlevels", PEDAL_DOWN.to_string());
         let boards: BTreeSet<i32> = facts.train.iter().chain(facts.validation).map(|one| one.board).collect();
         if !boards.contains(&0) {
             put("boards", words(&boards.into_iter().collect::<Vec<_>>()));
         }
         if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, &settled) {
-            put("bound95_unsettled_mm", words(&wider));
+            put(&format!("bound95_unsettled_{unit}"), words(&wider));
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
             facts
@@ -154,7 +148,7 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
             put("load_information", words(&load.information));
             put("load_limit_kg", load.limit_kg.to_string());
         }
-        put("correction_bound_mm", format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
+        put(&format!("correction_bound_{unit}"), format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
     }
     let (low, high) = ranges(facts, is_raven);
     let stated = if is_raven { FEATURES } else { facts.chain.inputs() };
@@ -164,7 +158,7 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     put("domain_center", words(&center[..stated]));
     put("domain_weight", words(&weight[..stated]));
     put("domain_limit", limit.to_string());
-    put("bound95_mm", words(&settled));
+    put(&format!("bound95_{unit}"), words(&settled));
     put("golden", golden(facts));
     card.insert(VALIDATION_RMS.to_owned(), validation_rms(facts).to_string());
     card

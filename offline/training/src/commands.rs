@@ -9,6 +9,7 @@ use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
 use crate::{figures, load, onnx};
 use arm::Raven2;
+use ravenpose::correction::Quantity;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,8 +18,7 @@ use std::path::{Path, PathBuf};
 /// One row of training in so many has a memory that began a few seconds before.
 pub(crate) const YOUNG_EVERY: usize = 8;
 
-/// Properties of the card: noise that was added to the truth, in the outputs' unit, and what of a RAVEN-II's tip the model gives.
-pub(crate) const TRUTH_NOISE: &str = "ravenpose.truth_noise_mm";
+/// Property of the card: what of a RAVEN-II's tip the model gives.
 pub(crate) const TARGET: &str = "ravenpose.target";
 
 /// What is to be trained.
@@ -209,6 +209,11 @@ fn trained_on(wish: &Wish, rows: [usize; 3], parts: &Parts, set: &DataSet) -> St
 }
 
 /// Which runs took part in what, and how they were read: for `evaluate`.
+/// Property of the card: the noise that was added to the truth.
+pub(crate) fn truth_noise_key(target: Quantity) -> String {
+    format!("ravenpose.truth_noise_{}", target.unit())
+}
+
 fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
     let ids = |set: &[Trajectory]| set.iter().map(Trajectory::id).collect::<Vec<_>>().join(" ");
     let sketches = |set: &[Trajectory]| set.iter().map(|one| one.sketch.word()).collect::<Vec<_>>().join(" ");
@@ -219,7 +224,7 @@ fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
         ("ravenpose.train_sketches".to_owned(), sketches(&parts.train)),
         ("ravenpose.validation_sketches".to_owned(), sketches(&parts.validation)),
         ("ravenpose.truth_hz".to_owned(), wish.reading.truth_hz.to_string()),
-        (TRUTH_NOISE.to_owned(), wish.reading.truth_noise.to_string()),
+        (truth_noise_key(wish.reading.target), wish.reading.truth_noise.to_string()),
         ("ravenpose.recipe".to_owned(), recipe),
         (TARGET.to_owned(), wish.reading.target.name().to_owned()),
     ]);

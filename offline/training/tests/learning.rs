@@ -5,9 +5,10 @@ mod common;
 
 use common::{Folder, runs, small};
 use ravenpose::card::Card;
+use ravenpose::correction::Quantity;
 use std::path::{Path, PathBuf};
 use training::commands::{self, Event, Model, Wish};
-use training::data::{self, Reading, Target};
+use training::data::{self, Reading};
 use training::error::TrainingError;
 use training::evaluate::{self, Report};
 use training::preset::{First, Recipe};
@@ -203,12 +204,12 @@ fn what_is_learnt_is_less_than_half_wrong_on_a_run_that_nobody_saw() {
 }
 
 #[test]
-fn the_orientation_is_learnt_as_well_and_the_service_refuses_such_a_model() {
+fn the_orientation_is_learnt_as_well_and_the_service_takes_it_for_that_alone() {
     let folder = Folder::new("orientation");
     let files = runs(&folder, 6, 10.0, ".mcap");
     let out = folder.file("model.onnx");
     let recipe = Recipe { epochs: 60, batch: 32, ..small("default") };
-    let reading = Reading { plays: recipe.plays(), target: Target::Orientation, ..Reading::default() };
+    let reading = Reading { plays: recipe.plays(), target: Quantity::Orientation, ..Reading::default() };
     commands::train(&Wish { data: &files, reading: &reading, recipe: &recipe, out: &out }, &mut |_| {}).expect("trained");
     let report = judged(&folder, &out, &files, &Reading::default(), true).expect("report");
     assert_eq!(report.outputs, ["turn_x_deg", "turn_y_deg", "turn_z_deg"]);
@@ -219,6 +220,8 @@ fn the_orientation_is_learnt_as_well_and_the_service_refuses_such_a_model() {
     assert!((0.1..10.0).contains(&raw) && left < 0.7 * raw, "{left} of {raw}");
     assert_eq!(rms("rigid + random forest"), None, "it knows positions only");
     let card = Model::read(&out).expect("model").card;
-    let refused = Card::read(&card).expect_err("another unit").to_string();
+    let taken = Card::read(&card, Quantity::Orientation).expect("the service's own card");
+    assert!(taken.bound95.iter().all(|bound| *bound > 0.0) && taken.bound > left, "{taken:?}");
+    let refused = Card::read(&card, Quantity::Position).expect_err("another unit").to_string();
     assert!(refused.contains("ravenpose.units") && refused.contains("orientation"), "{refused}");
 }

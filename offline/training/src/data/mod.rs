@@ -9,6 +9,7 @@ mod table;
 use crate::error::{TrainingError, hex};
 use crate::random::Random;
 use arm::Side;
+use ravenpose::correction::Quantity;
 use ravenpose::memory::Play;
 use ravenpose_wire::FEATURES;
 use sha2::{Digest, Sha256};
@@ -167,36 +168,12 @@ impl DataSet {
     }
 }
 
-/// What of a RAVEN-II's tip is learnt.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Target {
-    /// True minus reported position, mm, frame 0.
-    #[default]
-    Position,
-    /// The turn from the reported to the true orientation as a rotation vector, degrees, frame 0.
-    Orientation,
-}
-
-impl Target {
-    /// Names on the command line.
-    pub const NAMES: [&str; 2] = ["position", "orientation"];
-
-    /// Of a name; none for another word.
-    pub fn of_name(name: &str) -> Option<Self> {
-        [Self::Position, Self::Orientation].into_iter().find(|target| target.name() == name)
-    }
-
-    /// Name on the command line and in the card.
-    pub const fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-
-    /// Names of the three outputs, with their unit.
-    pub(crate) const fn outputs(self) -> [&'static str; 3] {
-        match self {
-            Self::Position => ["error_x_mm", "error_y_mm", "error_z_mm"],
-            Self::Orientation => ["turn_x_deg", "turn_y_deg", "turn_z_deg"],
-        }
+/// Names of the three outputs of a RAVEN-II's model, with their unit: true minus reported position, or the turn from the reported to the
+/// true orientation as a rotation vector, both in frame 0.
+const fn outputs_of(target: Quantity) -> [&'static str; 3] {
+    match target {
+        Quantity::Position => ["error_x_mm", "error_y_mm", "error_z_mm"],
+        Quantity::Orientation => ["turn_x_deg", "turn_y_deg", "turn_z_deg"],
     }
 }
 
@@ -215,7 +192,7 @@ pub struct Reading {
     /// Arm of a RAVEN-II.
     pub arm: Side,
     /// What of its tip is learnt.
-    pub target: Target,
+    pub target: Quantity,
     /// Named columns instead of the state of a RAVEN-II.
     pub columns: Option<Columns>,
 }
@@ -228,7 +205,7 @@ impl Default for Reading {
             seed: 0,
             plays: Vec::new(),
             arm: Side::Gold,
-            target: Target::Position,
+            target: Quantity::Position,
             columns: None,
         }
     }

@@ -1,10 +1,11 @@
 //! A RAVEN-II's recordings: full states with truth become `raven118-v1` and the tip's error in mm.
 
 use super::memory;
-use super::{DataSet, Reading, Target, Trajectory};
+use super::{DataSet, Reading, Trajectory, outputs_of};
 use crate::error::{TrainingError, shown};
 use arm::{Raven2, Side};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
+use ravenpose::correction::Quantity;
 use ravenpose::guard::Guard;
 use ravenpose::memory::{Memory, Play, may_follow_recorded};
 use ravenpose_wire::{FEATURES, PEDAL_DOWN, RavenState, features};
@@ -22,10 +23,10 @@ const ERROR_MAX_DEG: f64 = 60.0;
 const YOUNG_S: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
 /// A data set of a RAVEN-II without trajectories.
-pub(super) fn empty(target: Target, plays: &[Play]) -> DataSet {
+pub(super) fn empty(target: Quantity, plays: &[Play]) -> DataSet {
     DataSet {
         input_names: (0..FEATURES).map(features::name).chain(memory::names(plays)).collect(),
-        output_names: target.outputs().map(str::to_owned).to_vec(),
+        output_names: outputs_of(target).map(str::to_owned).to_vec(),
         is_raven: true,
         ..DataSet::default()
     }
@@ -63,7 +64,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
 struct Pairing<'a> {
     file: &'a Path,
     side: Side,
-    target: Target,
+    target: Quantity,
     arm: arm::Arm,
     period_ns: i64,
     state: Option<Box<RavenState>>,
@@ -196,8 +197,8 @@ impl<'a> Pairing<'a> {
             return Some(self.unfit(what, "remove the row or record again"));
         }
         let (limit, how) = match self.target {
-            Target::Position => (ERROR_MAX_MM, "mm apart"),
-            Target::Orientation => (ERROR_MAX_DEG, "deg turned against each other"),
+            Quantity::Position => (ERROR_MAX_MM, "mm apart"),
+            Quantity::Orientation => (ERROR_MAX_DEG, "deg turned against each other"),
         };
         (norm(label) > limit).then(|| {
             let what = format!("truth and reported tip are {:.0} {how} {time_s:.3} s after the first truth", norm(label));
@@ -208,8 +209,8 @@ impl<'a> Pairing<'a> {
     /// What is to be learnt; none where the truth does not say.
     fn label(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
         match self.target {
-            Target::Position => self.shift(state, truth),
-            Target::Orientation => self.turn(state, truth),
+            Quantity::Position => self.shift(state, truth),
+            Quantity::Orientation => self.turn(state, truth),
         }
     }
 
@@ -269,7 +270,7 @@ impl<'a> Pairing<'a> {
             notes.push(format!("{file}: does not say its run levels: all its truths are used"));
         }
         if self.found.rows() == 0 {
-            let tip = if self.target == Target::Position { "tip" } else { "orientation of the tip" };
+            let tip = if self.target == Quantity::Position { "tip" } else { "orientation of the tip" };
             let looked_for = format!("no true {tip} and no true joints 1 to 3 of the {} arm beside its states", self.side.name());
             return Err(TrainingError::NoTruth { file, looked_for });
         }

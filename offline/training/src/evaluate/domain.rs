@@ -6,6 +6,7 @@ use crate::commands::Model;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
 use crate::load::{self, Weighed};
+use ravenpose::correction::Quantity;
 use ravenpose::load::LoadCard;
 use std::ops::Range;
 
@@ -13,11 +14,19 @@ use std::ops::Range;
 const LEAVING: usize = 6;
 
 /// Judges bound and domain on trajectories with the model's estimates; `card` if the model watches the load.
-pub(super) fn trust(model: &Model, card: Option<&LoadCard>, test: &[Trajectory], estimates: &[Rest], names: &[String]) -> Trust {
+pub(super) fn trust(
+    model: &Model,
+    target: Quantity,
+    card: Option<&LoadCard>,
+    test: &[Trajectory],
+    estimates: &[Rest],
+    names: &[String],
+) -> Trust {
     let numbers = |key: &str| -> Vec<f64> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
     // As the inputs are: a constant of a card is exactly its float32.
     let floats = |key: &str| -> Vec<f32> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
-    let (bound95, bound95_unsettled) = (numbers("ravenpose.bound95_mm"), numbers("ravenpose.bound95_unsettled_mm"));
+    let key = |name: &str| format!("ravenpose.{name}_{}", target.unit());
+    let (bound95, bound95_unsettled) = (numbers(&key("bound95")), numbers(&key("bound95_unsettled")));
     let mut trust = Trust { bound95, bound95_unsettled, ..Trust::default() };
     coverage(&mut trust, test, estimates);
     let (low, high) = (floats("ravenpose.feature_min"), floats("ravenpose.feature_max"));

@@ -5,12 +5,13 @@ mod domain;
 mod metrics;
 mod page;
 
-use crate::commands::{Model, TARGET, TRUTH_NOISE, write_whole};
-use crate::data::{self, Reading, Sketch, Target, Trajectory};
+use crate::commands::{Model, TARGET, truth_noise_key, write_whole};
+use crate::data::{self, Reading, Sketch, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::rivals;
 use metrics::{AllFigures, Interval, Rest};
 use ravenpose::card::{Card, CardError};
+use ravenpose::correction::Quantity;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -238,10 +239,11 @@ fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajector
 /// [`TrainingError`]: model, data, or a folder that cannot be written.
 pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
     let model = Model::read(wish.model)?;
+    let target = model.card.get(TARGET).and_then(|name| Quantity::of_name(name)).unwrap_or_default();
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
-        truth_noise: model.number(TRUTH_NOISE).unwrap_or(0.0),
-        target: model.card.get(TARGET).and_then(|name| Target::of_name(name)).unwrap_or_default(),
+        truth_noise: model.number(&truth_noise_key(target)).unwrap_or(0.0),
+        target,
         plays: model.chain.plays.clone(),
         ..wish.reading.clone()
     };
@@ -283,10 +285,9 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             remedy: "give runs that it has not seen",
         });
     }
-    // As the service reads it; one of the orientation it refuses.
+    // As the service reads it.
     let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
-    let is_service = set.is_raven && reading.target == Target::Position;
-    let card = is_service.then(|| Card::read(&model.card)).transpose().map_err(refused)?;
+    let card = set.is_raven.then(|| Card::read(&model.card, target)).transpose().map_err(refused)?;
     if let Some(card) = &card {
         card.check_memory(model.chain.plays.len()).map_err(refused)?;
     }
@@ -311,7 +312,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         }
     }
     let load = card.as_ref().and_then(|card| card.load.as_ref());
-    let trust = domain::trust(&model, load, &test, &estimates, &set.input_names);
+    let trust = domain::trust(&model, target, load, &test, &estimates, &set.input_names);
     let mut notes = set.notes;
     if let Some(card) = &card {
         let refused = test.iter().filter(|one| !card.allowed.boards.is_empty() && !card.allowed.boards.contains(&one.board));

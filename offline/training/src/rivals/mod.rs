@@ -7,10 +7,11 @@ mod polynomial;
 mod recurrent;
 mod rigid;
 
-use crate::data::{Target, Trajectory};
+use crate::data::Trajectory;
 use crate::prepare;
 use arm::Side;
 use ndarray::Array2;
+use ravenpose::correction::Quantity;
 
 pub use forest::Forest;
 pub use gaussian::Gaussian;
@@ -31,7 +32,7 @@ pub trait Rival {
 pub(crate) const POSTURE: [usize; 7] = [56, 57, 58, 60, 61, 62, 63];
 
 /// The rivals that a data set of an arm of a RAVEN-II, or of a table, allows, with a name and where they come from. Two know positions only.
-pub fn all(arm: Option<(Side, Target)>, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
+pub fn all(arm: Option<(Side, Quantity)>, inputs: usize, seed: u64) -> Vec<(&'static str, &'static str, Box<dyn Rival>)> {
     let every: Vec<usize> = (0..inputs).collect();
     let mut rivals: Vec<(&'static str, &'static str, Box<dyn Rival>)> = Vec::new();
     if let Some((side, target)) = arm {
@@ -42,7 +43,7 @@ pub fn all(arm: Option<(Side, Target)>, inputs: usize, seed: u64) -> Vec<(&'stat
             "Peng 2024: posture, torque, lag, speed",
             Box::new(Polynomial::second_order_of_raven()),
         ));
-        if target == Target::Position {
+        if target == Quantity::Position {
             rivals.push(("rigid + random forest", "Seita 2018: two phases", Box::new(RigidForest::new(seed))));
         }
         rivals.push((
@@ -50,7 +51,7 @@ pub fn all(arm: Option<(Side, Target)>, inputs: usize, seed: u64) -> Vec<(&'stat
             "Mahler 2014: posture and speed, 600 inducing points",
             Box::new(Gaussian::of_raven(seed)),
         ));
-        if target == Target::Position {
+        if target == Quantity::Position {
             rivals.push((
                 "dual unscented Kalman filter",
                 "Haghighipanah 2015: elastic cables, at the truth's rate",
