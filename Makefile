@@ -47,6 +47,7 @@ install:
 	install -m 644 models/raven2-*.toml models/gap-vocabulary.json models/gap-report.schema.json $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 models/examples/*.toml $(DESTDIR)$(PREFIX)/share/ravenpose/models/examples/
 	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 models/raven2-worn.onnx models/raven2-worn.onnx.sha256 \
+	  models/raven2-worn-orientation.onnx models/raven2-worn-orientation.onnx.sha256 \
 	  $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 README.md LICENSE-MIT LICENSE-APACHE docs/*.md $(wildcard docs/*.svg) $(DESTDIR)$(PREFIX)/share/doc/ravenpose/
 
@@ -132,9 +133,9 @@ prove-small: offline
 prove: offline
 	target/release/ravenpose prove --matrix full --seed $(PROOF_SEED) --out $(BUILD)/proof/full-$(PROOF_SEED)
 
-# The shipped model again, from nothing: simulate 140 minutes after one homing (4 GB in build/training), let cameras see the first minute of
-# one run and take their truth in its place, train, judge on the runs that training left sealed. MODEL_PRESET=one-state for the same
-# without a memory.
+# The shipped models again, from nothing: simulate 140 minutes after one homing (4 GB in build/training), let cameras see the first minute of
+# one run and take that in its place, train for the position and for the orientation, judge on the runs that training left sealed.
+# MODEL_PRESET=one-state for the same without a memory.
 MODEL_PRESET ?= default
 TRAINING := $(BUILD)/training
 # By cameras instead of the simulator; the split of seed 1 learns from it.
@@ -147,6 +148,9 @@ model: offline
 	  models/see.sh $(TRAINING)/runs/$(SEEN).mcap 60 hard $(TRAINING)/seen $(TRAINING)/$(SEEN)_seen.mcap; fi
 	target/release/ravenpose train --data $(DATA) --preset $(MODEL_PRESET) --truth-noise 0.5 --seed 1 --out $(TRAINING)/raven2-worn.onnx
 	target/release/ravenpose evaluate --model $(TRAINING)/raven2-worn.onnx --data $(DATA) --seed 1 --out $(TRAINING)/report
+	target/release/ravenpose train --data $(DATA) --preset $(MODEL_PRESET) --target orientation --truth-noise 0.5 --seed 1 \
+	  --out $(TRAINING)/raven2-worn-orientation.onnx
+	target/release/ravenpose evaluate --model $(TRAINING)/raven2-worn-orientation.onnx --data $(DATA) --seed 1 --out $(TRAINING)/report-orientation
 
 # Every reader of files under cargo-fuzz, FUZZ_SECONDS each.
 FUZZ_SECONDS ?= 600

@@ -24,6 +24,6 @@ frame = json.load(open("scene/registration_true.json"))["world_to_frame_0"]
 with open("cameras.toml", "a") as file:
     file.write(f"\n[registration]\nrotation = {frame['rotation']}\ntranslation_mm = {frame['translation_mm']}\n")
 PYTHON
-"$ravenpose" pair run.mcap --truth truth.csv --cameras cameras.toml --clock-known --out "$out" > pair.txt
+"$ravenpose" pair run.mcap --truth truth.csv --cameras cameras.toml --clock-known --mounting-known --out "$out" > pair.txt
 # Gigabytes.
 rm -rf scene/frames

@@ -33,9 +33,9 @@ clean() {
 trap 'clean' EXIT
 trap 'echo; echo "demo: interrupted"; clean; exit 130' INT TERM HUP
 
-# play RECORDING MODEL: up to 20 s; sets `code` to 1 at any fault.
+# play RECORDING MODEL [ORIENTATION_MODEL]: up to 20 s; sets `code` to 1 at any fault.
 play() {
-  local run=$1 model=$2 truth=
+  local run=$1 model=$2 orientation=${3:-} truth=
   rm -f "$work"/run.rvs "$work"/truth.csv "$work"/*.log
   $bin/ravenpose convert "$run" "$work/run.rvs" | sed 's/^/  /'
   [ "${PIPESTATUS[0]}" -eq 0 ] || exit 2
@@ -58,6 +58,7 @@ wait = "sleep"
 model = "$(realpath "$model")"
 [green]
 model = "$(realpath "$model")"
+$([ -z "$orientation" ] || printf '[gold.orientation]\nmodel = "%s"\n' "$(realpath "$orientation")")
 [report]
 runtime_dir = "$work/run"
 histogram_dir = "$work/histograms"
@@ -123,5 +124,5 @@ fi
 echo "worn as the paper's was, with the model trained for it (docs/training.md), on a trajectory that it has not seen"
 $bin/ravenpose simulate --robot raven2-worn --minutes 0.3333333 --seed 2026 --homing-seed 1 --out "$work/simulated" | sed 's/^/  /'
 [ "${PIPESTATUS[0]}" -eq 0 ] || exit 2
-play "$work/simulated/run_0001.mcap" models/raven2-worn.onnx
+play "$work/simulated/run_0001.mcap" models/raven2-worn.onnx models/raven2-worn-orientation.onnx
 exit $code

@@ -42,36 +42,57 @@ void row(const char *name, std::vector<int64_t> &values) {
               quantile(values, 1.0));
 }
 
-using Point = std::array<double, 3>;
+// The true tip: position in um and orientation as a unit quaternion w, x, y, z, in frame 0; NaN where the table has none.
+struct Tip {
+  std::array<double, 3> um{NAN, NAN, NAN};
+  std::array<double, 4> wxyz{NAN, NAN, NAN, NAN};
+};
 
-// True positions in um, row by row; empty if the table has none.
-std::vector<Point> true_positions(const std::string &path) {
+// Row by row; empty if the table has no true positions.
+std::vector<Tip> true_tips(const std::string &path) {
+  const char *const names[7] = {"truth_x_mm", "truth_y_mm", "truth_z_mm", "truth_qw", "truth_qx", "truth_qy", "truth_qz"};
   std::ifstream file(path);
-  std::vector<Point> found;
+  std::vector<Tip> found;
   std::string line, cell;
-  std::array<int, 3> column{-1, -1, -1};
+  std::array<int, 7> column;
+  column.fill(-1);
   bool header = false;
   while (std::getline(file, line)) {
     if (line.empty() || line[0] == '#') continue;
     std::stringstream cells(line);
-    Point point{NAN, NAN, NAN};
+    Tip tip;
     for (int index = 0; std::getline(cells, cell, ','); ++index) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        if (!header && cell == std::string("truth_") + "xyz"[axis] + "_mm") column[axis] = index;
-        if (header && index == column[axis] && !cell.empty()) point[axis] = std::strtod(cell.c_str(), nullptr) * 1000.0;
+      for (size_t part = 0; part < 7; ++part) {
+        if (!header && cell == names[part]) column[part] = index;
+        if (!header || index != column[part] || cell.empty()) continue;
+        const double value = std::strtod(cell.c_str(), nullptr);
+        if (part < 3) tip.um[part] = value * 1000.0;
+        else tip.wxyz[part - 3] = value;
       }
     }
-    if (header) found.push_back(point);
+    if (header) found.push_back(tip);
     header = true;
   }
   if (column[0] < 0 || column[1] < 0 || column[2] < 0) found.clear();
   return found;
 }
 
-double distance2(const double *position, const Point &truth) {
+double distance2(const double *position, const Tip &truth) {
   double sum = 0;
-  for (size_t axis = 0; axis < 3; ++axis) sum += (position[axis] - truth[axis]) * (position[axis] - truth[axis]);
+  for (size_t axis = 0; axis < 3; ++axis) sum += (position[axis] - truth.um[axis]) * (position[axis] - truth.um[axis]);
   return sum;
+}
+
+// Angle between a rotation matrix (row-major) and the true one, degrees.
+double angle_deg(const float *matrix, const Tip &truth) {
+  const auto [w, x, y, z] = truth.wxyz;
+  const double there[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+                           2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                           2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
+  // Half of the chord between the two: good for small angles, where the trace is not.
+  double sum = 0;
+  for (int i = 0; i < 9; ++i) sum += (matrix[i] - there[i]) * (matrix[i] - there[i]);
+  return 2.0 * std::asin(std::min(1.0, std::sqrt(sum / 8.0))) * 57.29577951308232;
 }
 
 // Does the pose carry what the file says for this state?
@@ -85,6 +106,8 @@ bool right(const ravenpose_pose &pose, const ravenpose_state &state) {
       if (out.status != RAVENPOSE_STATUS_VALID && out.correction_um[axis] != 0.0) return false;
     }
     if (std::memcmp(out.orientation, &state.ori[9 * arm], sizeof out.orientation) != 0) return false;
+    const bool may_turn = out.status == RAVENPOSE_STATUS_VALID && out.orientation_model_id != 0;
+    if (!may_turn && std::memcmp(out.corrected_orientation, out.orientation, sizeof out.orientation) != 0) return false;
   }
   return pose.runlevel == state.runlevel;
 }
@@ -108,13 +131,14 @@ int main(int argc, char **argv) try {
   std::vector<ravenpose_state> states((bytes.size() - 64) / sizeof(ravenpose_state));
   std::memcpy(states.data(), bytes.data() + 64, states.size() * sizeof(ravenpose_state));
 
-  std::vector<Point> truth;
-  if (!truth_path.empty() && (truth = true_positions(truth_path)).empty()) {
+  std::vector<Tip> truth;
+  if (!truth_path.empty() && (truth = true_tips(truth_path)).empty()) {
     std::fprintf(stderr, "demo_client: %s: no truth_x_mm, truth_y_mm, truth_z_mm in it\n", truth_path.c_str());
     return 2;
   }
   double raw_sum2 = 0, corrected_sum2 = 0, raw_largest2 = 0;
-  uint64_t compared = 0;
+  double raw_angle2 = 0, corrected_angle2 = 0;
+  uint64_t compared = 0, angles = 0;
 
   struct sigaction action {};
   action.sa_handler = [](int) { stop = 1; };
@@ -177,12 +201,18 @@ int main(int argc, char **argv) try {
     to_client.push_back(now - pose->publish_time_ns);
     whole.push_back(pose->publish_time_ns - pose->source_time_ns);
     const ravenpose_arm_pose &gold = pose->arm[0];
-    if (gold.status == RAVENPOSE_STATUS_VALID && last_source <= truth.size() && std::isfinite(truth[last_source - 1][0])) {
-      const double raw2 = distance2(gold.raw_position_um, truth[last_source - 1]);
+    if (gold.status == RAVENPOSE_STATUS_VALID && last_source <= truth.size() && std::isfinite(truth[last_source - 1].um[0])) {
+      const Tip &tip = truth[last_source - 1];
+      const double raw2 = distance2(gold.raw_position_um, tip);
       raw_sum2 += raw2;
       raw_largest2 = std::max(raw_largest2, raw2);
-      corrected_sum2 += distance2(gold.corrected_position_um, truth[last_source - 1]);
+      corrected_sum2 += distance2(gold.corrected_position_um, tip);
       ++compared;
+      if (gold.orientation_model_id != 0 && std::isfinite(tip.wxyz[0])) {
+        raw_angle2 += std::pow(angle_deg(gold.orientation, tip), 2);
+        corrected_angle2 += std::pow(angle_deg(gold.corrected_orientation, tip), 2);
+        ++angles;
+      }
     }
     for (uint32_t arm = 0; arm < 2; ++arm) {
       const ravenpose_arm_pose &out = pose->arm[arm];
@@ -229,6 +259,11 @@ int main(int argc, char **argv) try {
     std::printf("  gold arm against its true tip, %llu valid poses: raw off by %.3f mm RMS, %.3f mm at most; corrected off by %.3f mm RMS\n",
                 (unsigned long long)compared, std::sqrt(raw_sum2 / n) / 1000.0, std::sqrt(raw_largest2) / 1000.0,
                 std::sqrt(corrected_sum2 / n) / 1000.0);
+    if (angles > 0) {
+      const double m = static_cast<double>(angles);
+      std::printf("  and its orientation: raw off by %.2f deg RMS; corrected off by %.2f deg RMS\n", std::sqrt(raw_angle2 / m),
+                  std::sqrt(corrected_angle2 / m));
+    }
   } else if (!truth.empty()) {
     std::printf("  gold arm against its true tip: no valid pose to compare\n");
   }

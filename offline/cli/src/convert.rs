@@ -120,7 +120,8 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
 
 fn states_as_table(source: Box<dyn Source>, format: TableFormat, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
     note_all(format.losses_of_states());
-    let table = StateTable::new(source, tidy::Options { arms, all_truth: false }).map_err(|error| error.to_string())?;
+    let table =
+        StateTable::new(source, tidy::Options { arms, all_truth: false, orientation: false }).map_err(|error| error.to_string())?;
     Ok(Box::new(table))
 }
 

@@ -185,7 +185,7 @@ fn states_or_table(path: &Path, arms: Option<Arms>) -> Result<Box<dyn TableSourc
     Ok(match opened {
         Opened::Table(source) => source,
         Opened::States(source) => {
-            let options = tidy::Options { arms, all_truth: false };
+            let options = tidy::Options { arms, all_truth: false, orientation: false };
             Box::new(StateTable::new(source, options).map_err(|error| error.to_string())?)
         }
     })

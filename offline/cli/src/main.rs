@@ -114,6 +114,9 @@ enum Command {
         /// That offset is exact, as where one wire or one clock triggers both: nothing of the clock is fitted to the motion
         #[arg(long, conflicts_with = "same")]
         clock_known: bool,
+        /// The fixture's axes are the end effector's, as its rig.toml has them: nothing of the orientation is fitted
+        #[arg(long)]
+        mounting_known: bool,
     },
     /// Where a simulation and recordings differ, which physics is missing, how large it is, and the model with it
     Gap {
@@ -251,16 +254,19 @@ fn main() -> ExitCode {
         }
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
-        Command::Pair { run, truth, out, cameras, register, same, offset_s, clock_known } => pair::run(&pair::Wish {
-            run: &run,
-            truth: truth.as_deref(),
-            out: &out,
-            cameras: cameras.as_deref(),
-            register: register.as_deref(),
-            same,
-            offset_s,
-            clock_known,
-        }),
+        Command::Pair { run, truth, out, cameras, register, same, offset_s, clock_known, mounting_known } => {
+            pair::run(&pair::Wish {
+                run: &run,
+                truth: truth.as_deref(),
+                out: &out,
+                cameras: cameras.as_deref(),
+                register: register.as_deref(),
+                same,
+                offset_s,
+                clock_known,
+                mounting_known,
+            })
+        }
         Command::Gap { real, sim, robot, out, seed, trace, watch, seconds } => {
             gap::run(&gap::Wish { real: &real, sim: &sim, robot: robot.as_deref(), out: &out, seed, trace, watch, seconds })
         }

@@ -9,6 +9,7 @@ use recordings::open::{Opened, open};
 use recordings::pairs::{Clock, ClockChoice, Options, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
 use recordings::save::{self, StateFormat};
 use recordings::stream::{self, Record};
+use recordings::tidy;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
@@ -31,6 +32,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) offset_s: Option<f64>,
     /// That offset is exact.
     pub(crate) clock_known: bool,
+    /// The fixture's axes are the end effector's.
+    pub(crate) mounting_known: bool,
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
@@ -49,11 +52,12 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
     let known = wish.cameras.map(registration::read).transpose()?;
-    let recording = plot::read(run)?;
+    let recording = plot::read_with(run, tidy::Options { orientation: true, ..tidy::Options::default() })?;
     let separate = wish.truth.map(plot::read).transpose()?;
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
     let frames = Truth::from_recording(separate.as_ref().unwrap_or(&recording)).map_err(|error| error.to_string())?;
     let mut options = if wish.same { Options::same_clock_and_frame() } else { Options::default() };
+    options.mounting_known = wish.mounting_known;
     if let Some(known) = known {
         options.registration = RegistrationChoice::Known(known);
     }

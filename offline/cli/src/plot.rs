@@ -21,11 +21,15 @@ pub(crate) fn run(input: &Path, out: &Path) -> Result<ExitCode, String> {
 
 /// A recording of any format as a table in memory.
 pub(crate) fn read(input: &Path) -> Result<Recording, String> {
+    read_with(input, tidy::Options::default())
+}
+
+/// The same, with these columns of states.
+pub(crate) fn read_with(input: &Path, options: tidy::Options) -> Result<Recording, String> {
     let name = input.display().to_string();
     let recording = match open(input).map_err(|error| error.to_string())? {
         Opened::Table(mut source) => table::collect(&name, source.as_mut()),
-        Opened::States(source) => StateTable::new(source, tidy::Options { arms: None, all_truth: false })
-            .and_then(|mut source| table::collect(&name, &mut source)),
+        Opened::States(source) => StateTable::new(source, options).and_then(|mut source| table::collect(&name, &mut source)),
     };
     recording.map_err(|error| error.to_string())
 }

@@ -12,7 +12,7 @@ fn read(path: &str, model: &RobotModel) -> Recording {
     let mut source = match open(Path::new(path)).expect("a recording") {
         Opened::Table(source) => source,
         Opened::States(source) => {
-            let options = tidy::Options { arms: None, all_truth: false };
+            let options = tidy::Options { arms: None, all_truth: false, orientation: false };
             Box::new(StateTable::new(source, options).expect("states"))
         }
     };

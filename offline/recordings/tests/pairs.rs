@@ -279,6 +279,36 @@ fn orientation_labels_leave_the_mounting_out() {
 }
 
 #[test]
+fn a_constant_error_of_the_orientation_stays_in_the_labels_where_the_mounting_is_known() {
+    let mut run = make(&Case::default());
+    let constant = UnitQuaternion::from_scaled_axis(Vector3::new(0.05, -0.02, 0.08));
+    let matrix = nalgebra::Matrix3::from_fn(|row, column| run.frame.rotation[row][column]);
+    let frame = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    let arm = |t: f64| UnitQuaternion::from_scaled_axis(Vector3::new(0.5 * (0.8 * t).sin(), 0.7 * (0.5 * t).cos(), 0.3 * t.sin()));
+    let parts = |q: UnitQuaternion<f64>| [q.w, q.i, q.j, q.k];
+    let columns: [Vec<f64>; 4] = std::array::from_fn(|i| run.t_s.iter().map(|&t| parts(arm(t))[i]).collect());
+    let seen = |&t: &f64| {
+        let t = run.clock.state_time_s(t);
+        parts(frame.inverse() * constant * arm(t))
+    };
+    run.truth.quaternion = Some(run.truth.t_s.iter().map(seen).collect());
+    let [w, x, y, z] = &columns;
+    let reported = Reported { quaternion: Some([w, x, y, z]), ..run.reported() };
+    let (clock, registration) = (ClockChoice::Known(run.clock), RegistrationChoice::Known(run.frame));
+    let fitted = Options { clock, registration, ..Options::default() };
+    let known = Options { mounting_known: true, ..fitted };
+    let rms = |options: &Options| {
+        let report = pair(&reported, &run.truth, options).expect("pairs").report.orientation.expect("both have orientations");
+        assert_eq!(report.is_known, options.mounting_known);
+        report.rms_rad
+    };
+    let (fitted, known) = (rms(&fitted), rms(&known));
+    assert!((known - constant.angle()).abs() < 0.003, "{known} of {}", constant.angle());
+    // About the end effector's own axes a constant turn about the base's is none, so that some of it is left.
+    assert!(fitted < 0.7 * known, "{fitted} of {known}");
+}
+
+#[test]
 fn matched_points_are_registered_and_a_line_is_refused() {
     let run = make(&Case { noise_m: 0.2e-3, offset_s: 0.0, ..Case::default() });
     let options =

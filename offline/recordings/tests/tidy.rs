@@ -122,7 +122,7 @@ fn truth_at_other_times_stands_in_the_nearest_row_with_its_offset() {
     let scratch = Scratch::new("tidy-offset");
     let states = motion(100, 0);
     let path = file(&scratch, &with_truth(&states, Side::Gold, 30, 600_000));
-    let run = to_recording("run", source(&path), Options { arms: Some(Arms::Gold), all_truth: false }).expect("recording");
+    let run = to_recording("run", source(&path), Options { arms: Some(Arms::Gold), ..Options::default() }).expect("recording");
     let offset = run.column("truth_offset_s").expect("offset");
     let rows: Vec<usize> = (0..100).filter(|row| !offset[*row].is_nan()).collect();
     assert_eq!(rows, [1, 31, 61, 91]);
@@ -142,7 +142,7 @@ fn truth_without_a_row_is_counted_and_truth_columns_can_be_asked_for() {
     far.time_ns += 1_000_000_000;
     records.push(Record::Truth(far));
     let path = file(&scratch, &records);
-    let mut table = StateTable::new(source(&path), Options { arms: Some(Arms::Gold), all_truth: false }).expect("table");
+    let mut table = StateTable::new(source(&path), Options { arms: Some(Arms::Gold), ..Options::default() }).expect("table");
     let run = table::collect("run", &mut table).expect("recording");
     assert_eq!(run.column("truth_x_m").expect("truth").iter().filter(|value| !value.is_nan()).count(), 1);
     assert_eq!(table.findings(), ["2 truth samples had no row of their own within 20 ms and were dropped"]);
@@ -151,10 +151,11 @@ fn truth_without_a_row_is_counted_and_truth_columns_can_be_asked_for() {
     let mut records: Vec<Record> = states.iter().map(record).collect();
     records.push(Record::Truth(truth_of(&states[8999], Side::Gold, &mut random)));
     let path = file(&scratch, &records);
-    let mut table = StateTable::new(source(&path), Options { arms: Some(Arms::Gold), all_truth: false }).expect("table");
+    let mut table = StateTable::new(source(&path), Options { arms: Some(Arms::Gold), ..Options::default() }).expect("table");
     assert!(table::collect("run", &mut table).expect("recording").column("truth_x_m").is_none());
     assert!(table.findings()[0].contains("ask for all truth columns"), "{:?}", table.findings());
-    let run = to_recording("run", source(&path), Options { arms: Some(Arms::Gold), all_truth: true }).expect("recording");
+    let run = to_recording("run", source(&path), Options { arms: Some(Arms::Gold), all_truth: true, ..Options::default() })
+        .expect("recording");
     assert!(!run.column("truth_x_m").expect("truth")[8999].is_nan());
 }
 

@@ -102,7 +102,7 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
         prepared: &trained.prepared,
         train: &parts.train,
         validation: &parts.validation,
-        trained_on: &trained_on(wish, rows, &parts, &set),
+        trained_on: &trained_on(wish, &parts, &set),
         more: more(wish, &parts, &set),
     };
     let card = card::card(&facts);
@@ -177,30 +177,25 @@ fn beside(model: &Path, extension: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn trained_on(wish: &Wish, rows: [usize; 3], parts: &Parts, set: &DataSet) -> String {
-    let minutes = |rows: usize| rows as f64 / wish.reading.truth_hz / 60.0;
+fn trained_on(wish: &Wish, parts: &Parts, set: &DataSet) -> String {
+    let minutes = |part: &[Trajectory]| part.iter().map(Trajectory::seconds).sum::<f64>() / 60.0;
     let kind = if set.is_raven { "RAVEN-II recordings" } else { "tables" };
     let [train, validation, test] = [parts.train.len(), parts.validation.len(), parts.test.names().len()];
-    let measured: Vec<&Trajectory> = parts.train.iter().filter(|one| one.is_measured).collect();
-    let measured = match measured.as_slice() {
-        [] => String::new(),
-        some => {
-            let rows = some.iter().map(|one| one.rows()).sum();
-            format!(
-                ", none to {} of the {train} that it learnt from ({:.1} minutes), whose truth was measured",
-                some.len(),
-                minutes(rows)
-            )
+    let measured: Vec<f64> = parts.train.iter().filter(|one| one.is_measured).map(Trajectory::seconds).collect();
+    let measured = match (measured.len(), measured.iter().sum::<f64>() / 60.0) {
+        (0, _) => String::new(),
+        (some, minutes) => {
+            format!(", none to {some} of the {train} that it learnt from ({minutes:.1} minutes), whose truth was measured")
         }
     };
     format!(
-        "{} {kind}, {:.1} minutes of truth at {} Hz, whole trajectories split {train}/{validation}/{test} (training/validation/test); learnt \
+        "{} {kind}, {:.1} minutes of truth at up to {} Hz, whole trajectories split {train}/{validation}/{test} (training/validation/test); learnt \
          from {} rows ({:.1} minutes); truth noise {} {} added{measured}; preset {}, seed {}",
         train + validation + test,
-        minutes(rows.iter().sum()),
+        minutes(&parts.train) + minutes(&parts.validation) + parts.test.seconds() / 60.0,
         wish.reading.truth_hz,
-        rows[0],
-        minutes(rows[0]),
+        parts.train.iter().map(Trajectory::rows).sum::<usize>(),
+        minutes(&parts.train),
         wish.reading.truth_noise,
         set.unit(),
         wish.recipe.name,
@@ -208,12 +203,12 @@ fn trained_on(wish: &Wish, rows: [usize; 3], parts: &Parts, set: &DataSet) -> St
     )
 }
 
-/// Which runs took part in what, and how they were read: for `evaluate`.
 /// Property of the card: the noise that was added to the truth.
 pub(crate) fn truth_noise_key(target: Quantity) -> String {
     format!("ravenpose.truth_noise_{}", target.unit())
 }
 
+/// Which runs took part in what, and how they were read: for `evaluate`.
 fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
     let ids = |set: &[Trajectory]| set.iter().map(Trajectory::id).collect::<Vec<_>>().join(" ");
     let sketches = |set: &[Trajectory]| set.iter().map(|one| one.sketch.word()).collect::<Vec<_>>().join(" ");

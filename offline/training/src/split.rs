@@ -54,6 +54,11 @@ impl Sealed {
         self.trajectories.iter().map(|one| one.name.clone()).collect()
     }
 
+    /// Time that all of them cover, s.
+    pub fn seconds(&self) -> f64 {
+        self.trajectories.iter().map(Trajectory::seconds).sum()
+    }
+
     /// Rows of all of them.
     pub fn rows(&self) -> usize {
         self.trajectories.iter().map(Trajectory::rows).sum()

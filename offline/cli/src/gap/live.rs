@@ -261,7 +261,8 @@ fn look(model: &RobotModel, options: &Options, (from_s, minute): Minute) -> Resu
 /// The minute as a table: of two connected arms that of the model, else the one that there is.
 fn as_table(minute: VecDeque<RavenState>, model: &RobotModel, notes: &mut Vec<String>) -> Result<Recording, String> {
     let table = |states: VecDeque<RavenState>, arms: Option<Arms>| {
-        StateTable::new(Box::new(States(states)), tidy::Options { arms, all_truth: false }).map_err(|error| error.to_string())
+        StateTable::new(Box::new(States(states)), tidy::Options { arms, all_truth: false, orientation: false })
+            .map_err(|error| error.to_string())
     };
     let first: VecDeque<RavenState> = minute.iter().take(1).copied().collect();
     let both = table(first, None)?.columns().iter().any(|column| column.name.starts_with("green_"));

@@ -24,7 +24,7 @@ fn recording(file: &Path, arms: Arms) -> Result<Recording, String> {
     }
     match open(file).map_err(|error| error.to_string())? {
         Opened::States(states) => {
-            let options = tidy::Options { arms: Some(arms), all_truth: false };
+            let options = tidy::Options { arms: Some(arms), all_truth: false, orientation: false };
             tidy::to_recording(&name, states, options).map_err(|error| error.to_string())
         }
         Opened::Table(mut source) => table::collect(&name, source.as_mut()).map_err(|error| error.to_string()),

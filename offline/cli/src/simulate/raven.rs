@@ -134,7 +134,8 @@ fn tidy_table(states: &Path, out: &Path, format: TableFormat) -> Result<(), Stri
     let open::Opened::States(source) = open::open(states).map_err(|error| error.to_string())? else {
         return Err(format!("{}: is not a recording of states", states.display()));
     };
-    let mut source = StateTable::new(source, tidy::Options { arms: None, all_truth: true }).map_err(|error| error.to_string())?;
+    let mut source = StateTable::new(source, tidy::Options { arms: None, all_truth: true, orientation: false })
+        .map_err(|error| error.to_string())?;
     let metadata = table::TableSource::metadata(&source).to_vec();
     let columns = table::TableSource::columns(&source).to_vec();
     let mut sink = save::create_table(out, format, &columns, &metadata).map_err(|error| error.to_string())?;

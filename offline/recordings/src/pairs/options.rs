@@ -86,6 +86,8 @@ pub struct Options {
     pub gap_max_s: f64,
     /// Keep only frames with the arm in this runlevel, where the states have one (3 is pedal down).
     pub runlevel: Option<i32>,
+    /// The fixture's axes are the end effector's: nothing of the orientation is fitted.
+    pub mounting_known: bool,
     /// What is an outlier.
     pub outliers: OutlierLimits,
     /// While the reported position stays within this distance of the last pair, m ...
@@ -116,6 +118,7 @@ impl Default for Options {
             registration: RegistrationChoice::Fit,
             gap_max_s: 0.025,
             runlevel: Some(3),
+            mounting_known: false,
             outliers: OutlierLimits { deviations: 6.0, step_m: 4e-3, gross_m: 30e-3 },
             standstill_m: 20e-6,
             standstill_every_s: 1.0,

@@ -1,12 +1,12 @@
-//! Orientation labels, where both streams have orientations. The fixture sits on the instrument in some constant rotation,
-//! which is estimated with them and takes up any constant orientation error of the arm.
+//! Orientation labels, where both streams have orientations. The fixture sits on the instrument in some constant rotation: known, or
+//! estimated with them, and then it takes up any constant orientation error of the arm.
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use super::drop::Judged;
 use super::rigid::Rigid;
 use super::track::{Found, Place, find, median};
-use super::{Reported, Truth};
+use super::{Options, Reported, Truth};
 
 /// Labels of the pairs and the mounting.
 pub(super) struct Orientations {
@@ -31,7 +31,7 @@ pub(super) fn labels(
     truth: &Truth,
     kept: &[Judged],
     rigid: &Rigid,
-    gap_max_s: f64,
+    options: &Options,
 ) -> Option<Orientations> {
     let (columns, seen) = (reported.quaternion?, truth.quaternion.as_ref()?);
     let turn = Rotation3::from_matrix_unchecked(rigid.matrix());
@@ -39,12 +39,13 @@ pub(super) fn labels(
     let both: Vec<Option<(Rotation3<f64>, Rotation3<f64>)>> = kept
         .iter()
         .map(|one| {
-            let arm = interpolated(reported.t_s, columns, one.state_time_s, gap_max_s, &mut place)?;
+            let arm = interpolated(reported.t_s, columns, one.state_time_s, options.gap_max_s, &mut place)?;
             Some((arm, turn * unit(seen[one.frame])?.to_rotation_matrix()))
         })
         .collect();
     let relative: Vec<Rotation3<f64>> = both.iter().flatten().map(|(arm, camera)| arm.inverse() * camera).collect();
-    let mounting = mean(&relative)?;
+    let fitted = mean(&relative)?;
+    let mounting = if options.mounting_known { Rotation3::identity() } else { fitted };
     let label = |(arm, camera): (Rotation3<f64>, Rotation3<f64>)| {
         let truth = camera * mounting.inverse();
         let q = UnitQuaternion::from_rotation_matrix(&truth);

@@ -93,8 +93,10 @@ pub struct LabelReport {
 pub struct OrientationReport {
     /// Pairs with an orientation on both sides.
     pub pairs: usize,
-    /// Rotation of the fixture on the end effector, rows; holds the arm's constant orientation error too.
+    /// Rotation of the fixture on the end effector, rows; fitted, it holds the arm's constant orientation error too.
     pub mounting: [[f64; 3]; 3],
+    /// Was it taken as known?
+    pub is_known: bool,
     /// RMS angle, rad.
     pub rms_rad: f64,
 }
@@ -155,7 +157,8 @@ impl fmt::Display for Report {
         self.label.fmt(f)?;
         if let Some(orientation) = &self.orientation {
             let degrees = orientation.rms_rad.to_degrees();
-            writeln!(f, "orientation: {degrees:.2} deg RMS in {} pairs after the fixture's mounting", orientation.pairs)?;
+            let how = if orientation.is_known { "with the fixture's mounting as given" } else { "after the fixture's mounting" };
+            writeln!(f, "orientation: {degrees:.2} deg RMS in {} pairs {how}", orientation.pairs)?;
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }

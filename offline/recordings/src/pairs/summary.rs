@@ -119,7 +119,7 @@ pub(super) fn paired(
     options: &Options,
 ) -> Paired {
     let rigid = aligned.fit.place.rigid();
-    let turned = orientation::labels(reported, truth, &drops.kept, &rigid, options.gap_max_s);
+    let turned = orientation::labels(reported, truth, &drops.kept, &rigid, options);
     let pairs: Vec<Pair> = drops
         .kept
         .iter()
@@ -142,7 +142,7 @@ pub(super) fn paired(
         let angles: Vec<f64> = turned.labels.iter().flatten().map(|label| length(label.turn_rad)).collect();
         let square = angles.iter().map(|angle| angle * angle).sum::<f64>();
         let rms_rad = (square / angles.len().max(1) as f64).sqrt();
-        OrientationReport { pairs: angles.len(), mounting: turned.mounting, rms_rad }
+        OrientationReport { pairs: angles.len(), mounting: turned.mounting, is_known: options.mounting_known, rms_rad }
     });
     let count = |reason: Reason| drops.fates.iter().filter(|fate| **fate == Some(reason)).count();
     let labels: Vec<[f64; 3]> = pairs.iter().map(|pair| pair.label_m).collect();

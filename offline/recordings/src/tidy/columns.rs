@@ -2,6 +2,7 @@
 
 use arm::published::SLOT_OF_JOINT;
 use arm::{Arm, JOINTS, Side};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use ravenpose_wire::RavenState;
 
 use crate::sample;
@@ -42,11 +43,12 @@ fn numbers(truth: &Truth) -> impl Iterator<Item = f64> {
 pub(super) struct ArmColumns {
     pub(super) arm: Arm,
     pub(super) truth: TruthShown,
+    pub(super) orientation: bool,
 }
 
 impl ArmColumns {
-    pub(super) fn new(side: Side, truth: TruthShown) -> Self {
-        Self { arm: sample::nominal(side), truth }
+    pub(super) fn new(side: Side, truth: TruthShown, orientation: bool) -> Self {
+        Self { arm: sample::nominal(side), truth, orientation }
     }
 
     /// The columns of this arm, in the order of [`ArmColumns::push`].
@@ -65,6 +67,9 @@ impl ArmColumns {
             names.extend((1..=JOINTS).map(|number| joint(quantity, number, if number == 3 { sliding } else { turning })));
         }
         names.extend(["x_mm", "y_mm", "z_mm"].map(str::to_owned));
+        if self.orientation {
+            names.extend(["qw", "qx", "qy", "qz"].map(str::to_owned));
+        }
         let mut truth = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"].map(str::to_owned).to_vec();
         truth.extend((1..=JOINTS).map(|number| joint("jpos", number, if number == 3 { "m" } else { "rad" })));
         truth.extend((1..=JOINTS).map(|number| joint("cable", number, "n")));
@@ -90,6 +95,9 @@ impl ArmColumns {
         row.extend(radians(&state.jvel));
         row.extend(radians(&state.jpos_d));
         row.extend(state.pos[first_axis..first_axis + 3].iter().map(|um| f64::from(*um) / 1e3));
+        if self.orientation {
+            row.extend(quaternion_wxyz(&state.ori[3 * first_axis..3 * first_axis + 9]));
+        }
         if let Some(truth) = truth {
             self.push_truth(row, truth, time_ns);
         } else {
@@ -106,6 +114,18 @@ impl ArmColumns {
             row.push(truth.time_ns.saturating_sub(time_ns) as f64 / 1e9);
         }
     }
+}
+
+/// Of a published rotation matrix, row-major; NaN where it is none.
+fn quaternion_wxyz(rows: &[f32]) -> [f64; 4] {
+    let matrix = Matrix3::from_row_iterator(rows.iter().map(|value| f64::from(*value)));
+    // Published in float32; what is further off is no rotation, as where nothing was published.
+    if (matrix.transpose() * matrix - Matrix3::identity()).amax() > 1e-3 {
+        return [f64::NAN; 4];
+    }
+    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    let turned = UnitQuaternion::new_normalize(*turned);
+    [turned.w, turned.i, turned.j, turned.k]
 }
 
 /// The millimetres that a reader turns into these metres again, if there are any.

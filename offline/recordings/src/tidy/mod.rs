@@ -32,6 +32,8 @@ pub struct Options {
     pub arms: Option<Arms>,
     /// Columns for every kind of truth, also where the first 8192 records hold none.
     pub all_truth: bool,
+    /// Columns of the reported orientation as a unit quaternion, `qw` to `qz`: end-effector axes into frame 0.
+    pub orientation: bool,
 }
 
 /// All states in memory as a recording in SI.

@@ -43,7 +43,7 @@ impl StateTable {
         }
         let sides = options.arms.map_or_else(|| connected(&peeked), |arms| arms.sides().to_vec());
         let shown = |side: &Side| if options.all_truth { TruthShown::ALL } else { truth_shown(&peeked, *side) };
-        let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, shown(side))).collect();
+        let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, shown(side), options.orientation)).collect();
         let start_ns = peeked.iter().find(|record| matches!(record, Record::State(_))).map(Record::time_ns);
         let mut columns = vec![TableColumn::number("t_s")];
         for arm in &arms {

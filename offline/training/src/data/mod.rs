@@ -70,6 +70,14 @@ impl Trajectory {
         self.time_s.len()
     }
 
+    /// Time that its rows cover, s, without pauses.
+    pub fn seconds(&self) -> f64 {
+        let mut spacings: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        spacings.sort_by(f64::total_cmp);
+        let median = spacings.get(spacings.len() / 2).copied().unwrap_or(0.0);
+        spacings.iter().filter(|spacing| **spacing <= 2.0 * median).sum::<f64>() + median
+    }
+
     /// Had the run's own memory settled by a row? True where there is none.
     pub fn is_settled(&self, row: usize) -> bool {
         self.young_places.is_empty() || self.settled_after_s.is_some_and(|after_s| self.time_s[row] >= after_s)
