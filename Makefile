@@ -142,7 +142,7 @@ TRAINING := $(BUILD)/training
 SEEN := run_0002
 DATA = $$(ls $(TRAINING)/runs/run_*.mcap | sed 's|.*/$(SEEN).mcap|$(TRAINING)/$(SEEN)_seen.mcap|')
 model: offline
-	if [ ! -f $(TRAINING)/runs/simulation.txt ]; then rm -rf $(TRAINING)/runs; \
+	if [ ! -f $(TRAINING)/runs/simulation.txt ]; then rm -rf $(TRAINING)/runs $(TRAINING)/$(SEEN)_seen.mcap; \
 	  target/release/ravenpose simulate --minutes 140 --seed 1 --homing-seed 1 --robot raven2-worn --out $(TRAINING)/runs; fi
 	if [ ! -f $(TRAINING)/$(SEEN)_seen.mcap ]; then \
 	  models/see.sh $(TRAINING)/runs/$(SEEN).mcap 60 hard $(TRAINING)/seen $(TRAINING)/$(SEEN)_seen.mcap; fi

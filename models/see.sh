@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What cameras make of a recording: its first seconds rendered as four webcams see them, the cameras found from their chessboards and
-# markers, the balls tracked, and states and truth paired. About six seconds of work for one of motion.
+# markers, the balls tracked, and states and truth paired. About ten seconds of work for one of motion.
 # usage: see.sh RECORDING SECONDS SCENE WORK OUT
 set -eu
 ravenpose=$(realpath "$(dirname "$0")/../target/release/ravenpose")

@@ -25,6 +25,11 @@ impl Quantity {
         }
     }
 
+    /// Of a card's units; none for others.
+    pub fn of_units(units: &str) -> Option<Self> {
+        [Self::Position, Self::Orientation].into_iter().find(|quantity| quantity.units() == units)
+    }
+
     const fn keys(self) -> Keys {
         match self {
             // The paper reports errors up to 10 mm.
@@ -56,6 +61,16 @@ pub enum CardError {
         found: String,
         /// As needed.
         expected: String,
+    },
+    /// A model of the other quantity.
+    #[error(
+        "corrects the {found}, not the {expected}; in ravenposed.toml models of the orientation belong in [gold.orientation] and [green.orientation]"
+    )]
+    OtherQuantity {
+        /// What it corrects.
+        found: &'static str,
+        /// What it was to correct.
+        expected: &'static str,
     },
     /// A needed property is absent.
     #[error("property {key} is missing; a trained model states it, see docs/models.md")]
@@ -116,6 +131,9 @@ impl Card {
         let get = |key: &str| metadata.get(key).map(String::as_str);
         let trained_on = get("ravenpose.trained_on").unwrap_or("").trim().to_owned();
         let untrained = trained_on.is_empty() || trained_on.starts_with("nothing");
+        if let Some(found) = get("ravenpose.units").and_then(Quantity::of_units).filter(|found| *found != quantity) {
+            return Err(CardError::OtherQuantity { found: found.name(), expected: quantity.name() });
+        }
         for (key, expected) in [("ravenpose.feature_layout", features::LAYOUT), ("ravenpose.units", quantity.units())] {
             match get(key) {
                 Some(found) if found == expected => {}

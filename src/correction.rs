@@ -113,12 +113,30 @@ pub(crate) struct Corrector<E> {
     model: ArmModel<E>,
     /// What the network said of the state that was judged last.
     target: Vector3<f64>,
-    pub(crate) correction: Vector3<f64>,
+    correction: Vector3<f64>,
+    /// On its way back from zero?
+    recovering: bool,
 }
 
 impl<E: Estimator> Corrector<E> {
     pub(crate) fn new(quantity: Quantity, model: ArmModel<E>) -> Self {
-        Self { quantity, model, target: Vector3::zeros(), correction: Vector3::zeros() }
+        Self { quantity, model, target: Vector3::zeros(), correction: Vector3::zeros(), recovering: false }
+    }
+
+    /// What is to be added.
+    pub(crate) fn correction(&self) -> &Vector3<f64> {
+        &self.correction
+    }
+
+    /// Nothing is to be added from now on.
+    pub(crate) fn drop_to_zero(&mut self) {
+        self.correction = Vector3::zeros();
+        self.recovering = false;
+    }
+
+    /// Corrections begin: from zero.
+    pub(crate) fn begin(&mut self) {
+        self.recovering = true;
     }
 
     fn loaded(&self) -> Option<&Model<E>> {
@@ -195,16 +213,19 @@ impl<E: Estimator> Corrector<E> {
         self.target = target;
     }
 
-    /// Moves the correction towards the model's answer by at most `step_max`; is it there?
-    pub(crate) fn approach(&mut self, step_max: f64) -> bool {
+    /// Moves the correction towards the model's answer, no faster than allowed. What to know of that.
+    pub(crate) fn approach(&mut self, pace: &Pace) -> u32 {
+        let (step_max, held_back) =
+            if self.recovering { (pace.recover, flag::RECOVERING) } else { (pace.rate, flag::RATE_LIMITED) };
         let missing = self.target - self.correction;
         let distance = missing.norm();
         if distance <= step_max {
             self.correction = self.target;
-            return true;
+            self.recovering = false;
+            return 0;
         }
         self.correction += missing * (step_max / distance);
-        false
+        held_back
     }
 
     /// The stated 95 % half widths, wider by what the correction still misses; NaN where none is stated. And what else to know of it.

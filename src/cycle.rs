@@ -157,7 +157,6 @@ struct Arm<E> {
     hold: u32,
     /// Why the hold began, kept while it lasts.
     hold_flags: u32,
-    recovering: bool,
     valid: bool,
     ever_valid: bool,
     reset_count: u32,
@@ -193,7 +192,6 @@ impl<E: Estimator> Cycle<E> {
             is_frozen: false,
             hold: limits.good_cycles,
             hold_flags: 0,
-            recovering: false,
             valid: false,
             ever_valid: false,
             reset_count: 0,
@@ -535,7 +533,7 @@ impl<E: Estimator> Arm<E> {
             return;
         }
         self.correct(limits, out);
-        out.corrected_position_um = (raw + self.position.correction).into();
+        out.corrected_position_um = (raw + self.position.correction()).into();
     }
 
     /// Moves the corrections towards the networks' answers, no faster than allowed.
@@ -544,26 +542,20 @@ impl<E: Estimator> Arm<E> {
             self.valid = true;
             self.ever_valid = true;
             self.hold_flags = 0;
-            self.recovering = true;
+            self.position.begin();
+            self.orientation.begin();
         }
-        let step_max = |pace: &Pace| if self.recovering { pace.recover } else { pace.rate };
-        let is_there =
-            [self.position.approach(step_max(&limits.position)), self.orientation.approach(step_max(&limits.orientation))]
-                == [true, true];
-        if !is_there {
-            out.flags |= if self.recovering { flag::RECOVERING } else { flag::RATE_LIMITED };
-        }
-        self.recovering &= !is_there;
+        out.flags |= self.position.approach(&limits.position) | self.orientation.approach(&limits.orientation);
         let (position, orientation) = (self.position.bound95(), self.orientation.bound95());
         out.flags |= position.1 | orientation.1;
         out.status = ArmStatus::Valid as u32;
         out.reset_count = self.reset_count;
         out.hold_cycles = 0;
-        out.correction_um = self.position.correction.into();
+        out.correction_um = (*self.position.correction()).into();
         out.bound95_um = position.0;
-        out.rotation_deg = self.orientation.correction.into();
+        out.rotation_deg = (*self.orientation.correction()).into();
         out.rotation_bound95_deg = orientation.0;
-        out.corrected_orientation = turned(&out.orientation, &self.orientation.correction);
+        out.corrected_orientation = turned(&out.orientation, self.orientation.correction());
     }
 
     /// Drops to the raw pose at once; the only step that is announced instead of slewed.
@@ -574,7 +566,7 @@ impl<E: Estimator> Arm<E> {
             self.reset_count = self.reset_count.wrapping_add(1);
         }
         self.valid = false;
-        self.uncorrect();
+        self.drop_to_zero();
         self.hold = limits.good_cycles;
         self.hold_flags |= reasons & flag::NEW_SOURCE;
         out.flags &= !(flag::RECOVERING | flag::RATE_LIMITED | flag::SETTLING | flag::MEMORY_UNSETTLED | flag::LOAD_UNWEIGHED);
@@ -586,10 +578,9 @@ impl<E: Estimator> Arm<E> {
         out.status = ArmStatus::Fallback as u32;
     }
 
-    fn uncorrect(&mut self) {
-        self.recovering = false;
-        self.position.correction = Vector3::zeros();
-        self.orientation.correction = Vector3::zeros();
+    fn drop_to_zero(&mut self) {
+        self.position.drop_to_zero();
+        self.orientation.drop_to_zero();
     }
 
     fn show_raw(&self, flags: u32, out: &mut ArmPose) {
@@ -612,7 +603,7 @@ impl<E: Estimator> Arm<E> {
             flags = flag::RESET;
         }
         self.valid = false;
-        self.uncorrect();
+        self.drop_to_zero();
         self.hold = limits.good_cycles;
         self.frozen.reset();
         self.forget();

@@ -158,27 +158,31 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::f
 }
 
 fn load_models(config: &Config) -> Result<Prepared, String> {
-    let mut names = [Vec::new(), Vec::new()];
+    let mut names = [String::new(), String::new()];
     let none = || ArmModels::from(ArmModel::None);
     let mut models = [none(), none()];
     for arm in 0..ARMS {
         let Some(sources) = &config.models[arm] else { continue };
-        models[arm].position = load_model(config, &sources.position, NAMES[arm], &mut names[arm])?;
+        let (model, name) = load_model(config, &sources.position, NAMES[arm])?;
+        (models[arm].position, names[arm]) = (model, name);
         if let Some(source) = &sources.orientation {
-            models[arm].orientation = load_model(config, source, &format!("orientation of the {}", NAMES[arm]), &mut names[arm])?;
+            let (model, name) = load_model(config, source, &format!("orientation of the {}", NAMES[arm]))?;
+            models[arm].orientation = model;
+            names[arm] = format!("{}; orientation {name}", names[arm]);
         }
     }
     if config.models.iter().all(Option::is_none) {
         say("no model is configured; every pose will be fallback(no_model)");
     }
-    Ok(Prepared { models, names: names.map(|names: Vec<String>| names.join("; orientation ")) })
+    Ok(Prepared { models, names })
 }
 
-fn load_model(config: &Config, source: &ModelSource, whose: &str, names: &mut Vec<String>) -> Result<ArmModel<Estimate>, String> {
+/// A model, and how statistics show it; `whose` arm is for the log.
+fn load_model(config: &Config, source: &ModelSource, whose: &str) -> Result<(ArmModel<Estimate>, String), String> {
     match model::load(source) {
         Ok(loaded) => {
             let weights = loaded.weights();
-            names.push(format!("{:016x} {}, {weights}", loaded.model.id, source.path.display()));
+            let name = format!("{:016x} {}, {weights}", loaded.model.id, source.path.display());
             let card = &loaded.card;
             say(&format!("{whose} arm: {weights}; {}", card.limits()));
             if card.untrained && config.allow_untrained {
@@ -186,11 +190,11 @@ fn load_model(config: &Config, source: &ModelSource, whose: &str, names: &mut Ve
             } else if card.untrained {
                 say(&format!("{whose} arm: the model is untrained; every pose will be fallback(untrained)"));
             }
-            Ok(ArmModel::Loaded(Box::new(loaded.model)))
+            Ok((ArmModel::Loaded(Box::new(loaded.model)), name))
         }
         Err(error) if config.allow_degraded => {
             say(&format!("{whose} arm: {error}; going on without it, as allow_degraded says"));
-            Ok(ArmModel::Rejected)
+            Ok((ArmModel::Rejected, format!("refused: {}", source.path.display())))
         }
         Err(error) => Err(error.to_string()),
     }

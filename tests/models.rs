@@ -448,7 +448,6 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
 #[test]
 fn a_model_corrects_the_quantity_that_it_was_trained_for_and_no_other() {
     let directory = TempDir::new("models-quantity");
-    let (position, orientation) = (Quantity::Position.units(), Quantity::Orientation.units());
     let load = |onnx: &Onnx, quantity| {
         let bytes = onnx.bytes();
         load_as(&directory.file("model.onnx", &bytes), Some(hash(&bytes)), quantity)
@@ -456,7 +455,7 @@ fn a_model_corrects_the_quantity_that_it_was_trained_for_and_no_other() {
     let turning = || {
         small()
             .trained()
-            .set("ravenpose.units", orientation)
+            .set("ravenpose.units", Quantity::Orientation.units())
             .set("ravenpose.correction_bound_deg", "7.5")
             .set("ravenpose.bound95_deg", "0.1 0.2 0.3")
     };
@@ -465,13 +464,13 @@ fn a_model_corrects_the_quantity_that_it_was_trained_for_and_no_other() {
     assert_eq!((model.bound, model.bound95), (card.bound, card.bound95), "degrees stay degrees");
     let mixed = |onnx: &Onnx, quantity, found: &str, expected: &str| {
         let line = load(onnx, quantity).err().expect("another quantity");
-        assert_eq!(
-            line,
-            format!("property ravenpose.units is {found:?}, expected {expected:?}; export the model again with this ravenpose")
+        assert!(
+            line.starts_with(&format!("corrects the {found}, not the {expected}; ")) && line.contains("[gold.orientation]"),
+            "{line}"
         );
     };
-    mixed(&turning(), Quantity::Position, orientation, position);
-    mixed(&small().trained(), Quantity::Orientation, position, orientation);
+    mixed(&turning(), Quantity::Position, "orientation", "position");
+    mixed(&small().trained(), Quantity::Orientation, "position", "orientation");
     let negative = turning().set("ravenpose.bound95_deg", "1 -2 3");
     assert_eq!(
         load(&negative, Quantity::Orientation).err().expect("refused"),
@@ -734,7 +733,9 @@ fn the_service_says_what_it_does_with_each_kind_of_model() {
     model("trained.onnx", &small().trained());
     model("untrained.onnx", &Onnx::untrained());
     let wrong = model("wrong.onnx", &small().trained().with_golden(|rows| rows[0][118] += 1.0));
+    model("turning.onnx", &small().trained().set("ravenpose.units", Quantity::Orientation.units()));
     let gold = |name: &str| format!("[gold]\nmodel = \"{name}\"\n");
+    let turned = |name: &str| format!("{}[gold.orientation]\nmodel = \"{name}\"\n", gold("trained.onnx"));
     let good = [
         (gold("trained.onnx"), String::new()),
         (
@@ -749,13 +750,16 @@ fn the_service_says_what_it_does_with_each_kind_of_model() {
             format!("allow_degraded = true\n{}", gold("wrong.onnx")),
             format!("ravenposed: gold arm: {wrong}: golden pair 0: output 0 is "),
         ),
+        (turned("turning.onnx"), String::new()),
+        (format!("allow_degraded = true\n{}", turned("trained.onnx")), "ravenposed: orientation of the gold arm: ".to_owned()),
     ];
     for (config, said) in good {
         let answer = service(&directory.file("config.toml", &config));
         let stderr = String::from_utf8_lossy(&answer.stderr);
         assert_eq!(answer.status.code(), Some(0), "{config}{stderr}");
         let (weights, others): (Vec<&str>, Vec<&str>) = stderr.lines().partition(|line| line.contains(" arm: weights "));
-        assert_eq!(weights.len(), usize::from(!config.contains("wrong")), "{config}{stderr}");
+        let refused = config.matches("allow_degraded").count();
+        assert_eq!(weights.len() + refused, config.matches(".onnx").count(), "{config}{stderr}");
         assert!(
             others.len() <= 1 && others.first().map_or(said.is_empty(), |line| format!("{line}\n").starts_with(&said)),
             "{config}{stderr}"
@@ -764,4 +768,6 @@ fn the_service_says_what_it_does_with_each_kind_of_model() {
     let line =
         service_refusal(&directory.file("config.toml", format!("{}[green]\nmodel = \"trained.onnx\"\n", gold("wrong.onnx"))));
     assert!(line.starts_with(&format!("{wrong}: golden pair 0: output 0 is ")), "{line}");
+    let line = service_refusal(&directory.file("config.toml", gold("turning.onnx")));
+    assert!(line.contains("turning.onnx: corrects the orientation, not the position; "), "{line}");
 }

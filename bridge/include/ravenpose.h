@@ -2,8 +2,8 @@
  *
  * Generated from bridge/src/lib.rs and wire/src by bridge/tests/header.rs: do not edit.
  *
- * Consumer rule: use the corrected position only if the layout version matches, the sequence has advanced, the age is below
- * RAVENPOSE_POSE_AGE_MAX_NS and the status is RAVENPOSE_STATUS_VALID; otherwise use the raw position. ravenpose_position() and
+ * Consumer rule: use corrected position and orientation only if the layout version matches, the sequence has advanced, the age is below
+ * RAVENPOSE_POSE_AGE_MAX_NS and the status is RAVENPOSE_STATUS_VALID; otherwise use the raw ones. ravenpose_position() and
  * ravenpose_orientation() do this.
  *
  * Pointers may be null (an error code); otherwise they must be valid. A handle may be used by any thread, one at a time.
@@ -280,11 +280,11 @@ typedef struct ravenpose_options {
 } ravenpose_options;
 
 /*
- The estimate for one arm. All positions in frame 0 of the arm, micrometres.
+ The estimate for one arm, in frame 0 of the arm: positions in micrometres, rotations in degrees.
  */
 typedef struct ravenpose_arm_pose {
   /*
-   An [`ArmStatus`]: use `corrected_position_um` only when it is `valid`.
+   An [`ArmStatus`]: use `corrected_position_um` and `corrected_orientation` only when it is `valid`.
    */
   uint32_t status;
   /*
@@ -292,7 +292,7 @@ typedef struct ravenpose_arm_pose {
    */
   uint32_t flags;
   /*
-   First eight bytes of the model file's SHA-256, big-endian (prints as the hash begins); 0 without a model.
+   First eight bytes of the SHA-256 of the position's model file, big-endian (prints as the hash begins); 0 without a model.
    */
   uint64_t model_id;
   /*
@@ -300,7 +300,7 @@ typedef struct ravenpose_arm_pose {
    */
   uint32_t reset_count;
   /*
-   Distance from the trained domain, 1 = its edge; -1 where it was not computed.
+   Distance from the trained domain, 1 = its edge, the larger one of the arm's models; -1 where it was not computed.
    */
   float domain_score;
   /*
@@ -539,9 +539,13 @@ int32_t ravenpose_position(const struct ravenpose_pose *pose,
                            double *position_um);
 
 /*
- The same for the orientation: nine numbers, row-major. `RAVENPOSE_OK` only where a model corrects the orientation, too.
+ The same for the orientation: nine numbers, row-major. Returns `RAVENPOSE_OK` for corrected, `RAVENPOSE_RAW` for RAVEN's own, also
+ where no model corrects the orientation, a negative code for bad arguments.
  */
-int32_t ravenpose_orientation(const struct ravenpose_pose *pose, uint32_t arm, int64_t now_ns, float *orientation);
+int32_t ravenpose_orientation(const struct ravenpose_pose *pose,
+                              uint32_t arm,
+                              int64_t now_ns,
+                              float *orientation);
 
 /*
  Number of arms in a pose.

@@ -11,7 +11,7 @@ pub enum Code {
     Ok = 0,
     /// No pose has come since the last one taken.
     NothingNew = 1,
-    /// The raw position was given: the correction may not be used.
+    /// The raw position or orientation was given: there is no correction that may be used.
     Raw = 2,
     /// A pointer that must not be null is.
     Null = -1,
@@ -42,7 +42,7 @@ pub enum Code {
 const TEXTS: [(Code, &CStr); 15] = [
     (Code::Ok, c"done"),
     (Code::NothingNew, c"no new pose since the last one taken"),
-    (Code::Raw, c"raw position: the correction may not be used now"),
+    (Code::Raw, c"raw: there is no correction that may be used now"),
     (Code::Null, c"a pointer that must not be null is null"),
     (Code::Version, c"version mismatch: compile the program against the installed ravenpose.h"),
     (Code::Argument, c"an argument is out of range or not UTF-8"),

@@ -299,7 +299,8 @@ pub unsafe extern "C" fn ravenpose_position(pose: *const CorrectedPose, arm: u32
     if usable { Code::Ok as i32 } else { Code::Raw as i32 }
 }
 
-/// The same for the orientation: nine numbers, row-major. `RAVENPOSE_OK` only where a model corrects the orientation, too.
+/// The same for the orientation: nine numbers, row-major. Returns `RAVENPOSE_OK` for corrected, `RAVENPOSE_RAW` for RAVEN's own, also
+/// where no model corrects the orientation, a negative code for bad arguments.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ravenpose_orientation(pose: *const CorrectedPose, arm: u32, now_ns: i64, orientation: *mut f32) -> i32 {
     // SAFETY: the caller gives null or a valid pose.

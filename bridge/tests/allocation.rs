@@ -74,6 +74,15 @@ fn million() -> ! {
                 assert_eq!(code, i32::from(call % 3 != 0));
                 if code == 0 {
                     assert_eq!(got.sequence, pose.sequence);
+                    let (mut um, mut matrix) = ([0.0; 3], [0.0; 9]);
+                    // SAFETY: a pose that came, and room.
+                    let rule = unsafe {
+                        [
+                            ravenpose_position(&raw const got, 0, ravenpose_now_ns(), um.as_mut_ptr()),
+                            ravenpose_orientation(&raw const got, 0, ravenpose_now_ns(), matrix.as_mut_ptr()),
+                        ]
+                    };
+                    assert_eq!(rule, [Code::Absent as i32; 2]);
                     READ.fetch_add(1, SeqCst);
                 }
             }

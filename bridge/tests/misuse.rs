@@ -159,21 +159,28 @@ fn the_consumer_rule_gives_raw_unless_everything_is_right() {
     torn.guard_tail = 4;
     assert_eq!(rule(&torn, 0, 1_000_000_001).0, Code::Torn as i32);
 
+    let (own, turned_by_model) =
+        ([1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], [-9.0_f32, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0]);
     let mut turned = good;
-    turned.arm[0].orientation[0] = 1.0;
-    turned.arm[0].corrected_orientation[0] = 2.0;
-    let rule = |pose: &CorrectedPose, now: i64| {
-        let mut matrix = [0.0; 9];
+    (turned.arm[0].orientation, turned.arm[0].corrected_orientation) = (own, turned_by_model);
+    let rule = |pose: &CorrectedPose, arm: u32, now: i64| {
+        let mut matrix = [0.5; 9];
         // SAFETY: valid pointers.
-        let code = unsafe { ravenpose_orientation(pose, 0, now, matrix.as_mut_ptr()) };
-        (code, matrix[0])
+        let code = unsafe { ravenpose_orientation(pose, arm, now, matrix.as_mut_ptr()) };
+        (code, matrix)
     };
-    assert_eq!(rule(&turned, 1_004_999_999), (Code::Raw as i32, 1.0), "no model turned it");
+    let (fresh, untouched) = (1_004_999_999, [0.5; 9]);
+    assert_eq!(rule(&turned, 0, fresh), (Code::Raw as i32, own), "no model turned it");
     turned.arm[0].orientation_model_id = 9;
-    assert_eq!(rule(&turned, 1_004_999_999), (Code::Ok as i32, 2.0));
-    assert_eq!(rule(&turned, 1_005_000_000), (Code::Raw as i32, 1.0), "too old");
-    turned.arm[0].status = ArmStatus::Absent as u32;
-    assert_eq!(rule(&turned, 1_004_999_999).0, Code::Absent as i32);
+    assert_eq!(rule(&turned, 0, fresh), (Code::Ok as i32, turned_by_model));
+    assert_eq!(rule(&turned, 0, 1_005_000_000), (Code::Raw as i32, own), "too old");
+    assert_eq!(rule(&turned, 2, fresh), (Code::Argument as i32, untouched));
+    assert_eq!(rule(&turned, 1, fresh), (Code::Absent as i32, untouched));
+    let mut torn = turned;
+    torn.guard_tail = 4;
+    assert_eq!(rule(&torn, 0, fresh), (Code::Torn as i32, untouched));
+    turned.arm[0].status = ArmStatus::Fallback as u32;
+    assert_eq!(rule(&turned, 0, fresh), (Code::Raw as i32, own));
 }
 
 #[test]

@@ -6,7 +6,6 @@
 
 use crate::common::Rng;
 use crate::world::{BOUND_DEG, BOUND_UM, Fake, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, TURN_HUGE, TURN_NAN, cycle, state};
-use ravenpose::correction::Pace;
 use ravenpose::cycle::{Counters, Cycle, Limits};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag};
 use std::collections::HashMap;
@@ -216,6 +215,8 @@ struct Checker {
     sequence: u64,
     newest: HashMap<u64, (u64, i64)>,
     good_in_row: [u64; 2],
+    /// Of each arm, position and orientation.
+    recovering: [[bool; 2]; 2],
     /// `held` of the first state of a freeze that got through.
     first_held: Option<(u64, u64)>,
     valid: u64,
@@ -303,12 +304,21 @@ impl Checker {
                 "the drop is announced where it happens"
             );
             if !announced {
-                let slew = |pace: &Pace| if arm.flags & flag::RECOVERING != 0 { pace.recover } else { pace.rate };
-                let steps = [
-                    (step(arm.correction_um, before.correction_um), slew(&limits.position)),
-                    (step(arm.rotation_deg, before.rotation_deg), slew(&limits.orientation)),
-                ];
-                assert!(steps.iter().all(|(step, slew)| *step <= slew * (1.0 + 1e-9)), "steps {steps:?} of arm {index}");
+                for (quantity, (step, pace)) in [
+                    (step(arm.correction_um, before.correction_um), limits.position),
+                    (step(arm.rotation_deg, before.rotation_deg), limits.orientation),
+                ]
+                .into_iter()
+                .enumerate()
+                {
+                    // On its way back until a step falls short of what is allowed: then it has arrived.
+                    let recovering = &mut self.recovering[index][quantity];
+                    *recovering |= arm.status == VALID && before.status != VALID;
+                    let slew = if *recovering { pace.recover } else { pace.rate };
+                    assert!(step <= slew * (1.0 + 1e-9), "step {step} of quantity {quantity} of arm {index}");
+                    *recovering &= step >= slew * (1.0 - 1e-6);
+                    assert!(!*recovering || arm.flags & flag::RECOVERING != 0, "on its way back, and does not say so");
+                }
             }
         }
     }
@@ -337,6 +347,7 @@ fn run(seed: u64, count: u64) -> Checker {
         sequence: start.published,
         newest: HashMap::new(),
         good_in_row: [0; 2],
+        recovering: [[false; 2]; 2],
         first_held: None,
         valid: 0,
         fallbacks: 0,

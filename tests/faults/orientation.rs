@@ -1,9 +1,11 @@
 //! The orientation beside the position: turned by what its own model says, slewed, dropped and bounded as the position is.
 
-use crate::world::{Bench, Fake, MS, TURN_HUGE, TURN_NAN, model, state, turning};
+use crate::world::{Bench, MS, TURN_HUGE, TURN_NAN, model, state, turning};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Limits};
-use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, RavenState, flag};
+use ravenpose::correction::Pace;
+use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Estimator, Limits, Model};
+use ravenpose::guard::{Allowed, Domain, Guard};
+use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
 
 const VALID: u32 = ArmStatus::Valid as u32;
 const FALLBACK: u32 = ArmStatus::Fallback as u32;
@@ -23,7 +25,8 @@ fn matrix(row_major: &[f32; 9]) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| f64::from(row_major[3 * row + column]))
 }
 
-fn is_raw(arm: &ArmPose) -> bool {
+/// Is the orientation RAVEN's own?
+pub(crate) fn is_raw(arm: &ArmPose) -> bool {
     arm.rotation_deg == [0.0; 3]
         && arm.corrected_orientation.map(f32::to_bits) == arm.orientation.map(f32::to_bits)
         && arm.rotation_bound95_deg.iter().all(|bound| bound.is_nan())
@@ -84,8 +87,101 @@ fn a_doubtful_answer_about_either_drops_both() {
     }
 }
 
-fn after(models: ArmModels<Fake>, allow_untrained: bool, cycles: u64) -> CorrectedPose {
-    let mut cycle = Cycle::new(Limits::default(), [models, ArmModel::None.into()], allow_untrained, 0);
+#[test]
+fn a_rotation_on_its_way_back_does_not_hold_the_position_back() {
+    let mut bench = Bench::new();
+    // Rotations return more slowly than positions here.
+    let limits = Limits { orientation: Pace { recover: 0.001, ..Limits::default().orientation }, ..Limits::default() };
+    bench.cycle = crate::world::cycle(limits);
+    let there = (0..2000).map(|_| bench.good().arm[0]).find(|arm| arm.status == VALID && arm.bound95_um == [300.0, 400.0, 500.0]);
+    let before = there.expect("the position has arrived");
+    assert_eq!(before.flags, flag::RECOVERING, "the rotation has not");
+    let mut state = bench.next_state();
+    state.pos[0] = -15_000;
+    let pose = bench.run(&[state]).expect("answered");
+    let step = (Vector3::from(pose.arm[0].correction_um) - Vector3::from(before.correction_um)).norm();
+    assert!((step - limits.position.rate).abs() < 1e-6, "{step}");
+    assert_eq!(pose.arm[0].flags, flag::RECOVERING | flag::RATE_LIMITED);
+}
+
+#[test]
+fn a_rotation_that_jumps_is_rate_limited_and_flagged() {
+    let mut bench = Bench::new();
+    let before = bench.settle().arm[0];
+    let mut state = bench.next_state();
+    state.pos[0] = -15_000;
+    let arm = bench.run(&[state]).expect("answered").arm[0];
+    let step = (Vector3::from(arm.rotation_deg) - Vector3::from(before.rotation_deg)).norm();
+    assert!((step - Limits::default().orientation.rate).abs() < 1e-9, "{step}");
+    assert_eq!((arm.status, arm.flags), (VALID, flag::RATE_LIMITED));
+}
+
+/// An estimator that says of itself what it is told to.
+#[derive(Clone, Copy, Default)]
+struct Says {
+    unsettled: bool,
+    unweighed: bool,
+    load: Option<f32>,
+}
+
+impl Estimator for Says {
+    fn is_settled(&self) -> bool {
+        !self.unsettled
+    }
+
+    fn has_weighed(&self) -> bool {
+        !self.unweighed
+    }
+
+    fn load_score(&self) -> Option<f32> {
+        self.load
+    }
+
+    fn run(&mut self, _features: &[f32; FEATURES], error: &mut [f32; 3]) {
+        *error = [0.0, 0.0, 0.001];
+    }
+}
+
+/// What the arm says in the end if only the orientation's model has this to say.
+fn said(says: Says, allowed: Allowed, domain: Option<Domain>) -> ArmPose {
+    let model = |estimator, allowed, guard| {
+        let (bound95, bound95_unsettled) = ([1.0; 3], [2.0; 3]);
+        ArmModel::Loaded(Box::new(Model {
+            estimator,
+            guard,
+            allowed,
+            id: 1,
+            bound: 8.0,
+            bound95,
+            bound95_unsettled,
+            untrained: false,
+        }))
+    };
+    let position = model(Says::default(), Allowed::default(), Guard::new(None));
+    last_of(ArmModels { position, orientation: model(says, allowed, Guard::new(domain)) }, false, 300).arm[0]
+}
+
+#[test]
+fn what_only_the_model_of_the_orientation_finds_is_said_of_the_arm() {
+    let fine = said(Says::default(), Allowed::default(), None);
+    assert_eq!((fine.status, fine.flags, fine.bound95_um, fine.rotation_bound95_deg), (VALID, 0, [1.0; 3], [1.0; 3]));
+    let unsettled = said(Says { unsettled: true, ..Says::default() }, Allowed::default(), None);
+    assert_eq!((unsettled.status, unsettled.flags), (VALID, flag::MEMORY_UNSETTLED));
+    assert_eq!((unsettled.bound95_um, unsettled.rotation_bound95_deg), ([1.0; 3], [2.0; 3]));
+    let unweighed = said(Says { unweighed: true, ..Says::default() }, Allowed::default(), None);
+    assert_eq!((unweighed.status, unweighed.flags), (VALID, flag::LOAD_UNWEIGHED));
+    let loaded = said(Says { load: Some(1.5), ..Says::default() }, Allowed::default(), None);
+    assert_eq!((loaded.status, loaded.flags, loaded.domain_score), (FALLBACK, flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD, 1.5));
+    let elsewhere = said(Says::default(), Allowed { runlevels: vec![7], boards: Vec::new() }, None);
+    assert_eq!((elsewhere.status, elsewhere.flags), (FALLBACK, flag::STATE_NOT_ALLOWED));
+    let all = |value: f32| [value; FEATURES];
+    let domain = Domain { min: all(f32::MIN), max: all(f32::MIN), center: all(0.0), weight: all(0.0), limit: 1.0 };
+    let outside = said(Says::default(), Allowed::default(), Some(domain));
+    assert_eq!((outside.status, outside.flags), (FALLBACK, flag::OUT_OF_RANGE));
+}
+
+fn last_of<E: Estimator>(models: ArmModels<E>, allow_untrained: bool, cycles: u64) -> CorrectedPose {
+    let mut cycle = Cycle::new(Limits::default(), [models, ArmModels::from(ArmModel::None)], allow_untrained, 0);
     let mut pose = CorrectedPose::new();
     for step in 1..=cycles {
         let now = (1000 + step as i64) * MS;
@@ -98,22 +194,22 @@ fn after(models: ArmModels<Fake>, allow_untrained: bool, cycles: u64) -> Correct
 
 #[test]
 fn without_a_model_of_it_the_orientation_is_passed_through_and_says_so() {
-    let arm = after(model().into(), false, 500).arm[0];
+    let arm = last_of(model().into(), false, 500).arm[0];
     assert_eq!((arm.status, arm.flags, arm.orientation_model_id), (VALID, 0, 0));
     assert!(is_raw(&arm) && arm.correction_um != [0.0; 3], "{arm:?}");
 }
 
 #[test]
 fn a_refused_or_untrained_model_of_the_orientation_ends_the_correction() {
-    let refused = after(ArmModels { position: model(), orientation: ArmModel::Rejected }, false, 200).arm[0];
+    let refused = last_of(ArmModels { position: model(), orientation: ArmModel::Rejected }, false, 200).arm[0];
     assert_eq!((refused.status, refused.flags), (FALLBACK, flag::MODEL_REJECTED));
     let untrained = || {
         let ArmModel::Loaded(mut loaded) = turning() else { panic!("a model") };
         loaded.untrained = true;
         ArmModels { position: model(), orientation: ArmModel::Loaded(loaded) }
     };
-    let refused = after(untrained(), false, 200).arm[0];
+    let refused = last_of(untrained(), false, 200).arm[0];
     assert_eq!((refused.status, refused.flags), (FALLBACK, flag::UNTRAINED));
-    let allowed = after(untrained(), true, 500).arm[0];
+    let allowed = last_of(untrained(), true, 500).arm[0];
     assert_eq!((allowed.status, allowed.flags), (VALID, flag::UNTRAINED_ALLOWED));
 }

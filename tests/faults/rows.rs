@@ -1,11 +1,12 @@
 //! One test per row of the fault table that concerns the pure cycle; the name begins with the row.
 
 use crate::common::Rng;
+use crate::orientation::is_raw;
 use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, model as model_of_world, state};
 use ravenpose::cycle::{ArmModel, Counters, Cycle, Limits};
 use ravenpose::guard::Guard;
 use ravenpose_transport::DEPTH_MAX;
-use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, features, flag};
+use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, RavenState, features, flag};
 
 const VALID: u32 = ArmStatus::Valid as u32;
 const FALLBACK: u32 = ArmStatus::Fallback as u32;
@@ -18,6 +19,7 @@ fn assert_fallback(pose: &CorrectedPose, reason: u32) {
         assert_eq!(arm.correction_um, [0.0; 3]);
         assert_eq!(arm.corrected_position_um, arm.raw_position_um);
         assert!(arm.bound95_um.iter().all(|bound| bound.is_nan()));
+        assert!(is_raw(arm), "{arm:?}");
     }
 }
 
@@ -567,6 +569,9 @@ fn an_arm_that_is_not_connected_is_absent_and_returns_through_settling() {
     let pose = bench.run(&[state]).expect("answered");
     assert_eq!((pose.arm[0].status, pose.arm[1].status, pose.arms), (VALID, ArmStatus::Absent as u32, 1));
     assert_eq!((pose.arm[1].flags, pose.arm[1].reset_count), (flag::RESET, 1), "the drop is announced");
+    let absent = ArmPose { flags: flag::RESET, reset_count: 1, ..ArmPose::ABSENT };
+    // Compared as text, because a bound of NaN equals nothing.
+    assert_eq!(format!("{:?}", pose.arm[1]), format!("{absent:?}"));
     let pose = bench.good();
     assert_eq!(pose.arm[1].status, FALLBACK);
     assert_eq!(pose.arm[1].reset_count, 1);

@@ -8,9 +8,9 @@ pub enum ArmStatus {
     Absent = 0,
     /// No correction yet: fewer than the wanted good cycles since the start.
     Starting = 1,
-    /// The corrected position may be used.
+    /// The corrected position and orientation may be used.
     Valid = 2,
-    /// Raw position, correction zero; `flags` say why.
+    /// Raw position and orientation, corrections zero; `flags` say why.
     Fallback = 3,
 }
 
@@ -47,7 +47,7 @@ pub mod flag {
     pub const OUTPUT_BEYOND_BOUND: u32 = 1 << 7;
     /// Too many cycles in a row exceeded the budget.
     pub const BUDGET_EXCEEDED: u32 = 1 << 8;
-    /// The arm's model was refused at start and the configuration allows to go on without it.
+    /// A model of the arm was refused at start and the configuration allows to go on without it.
     pub const MODEL_REJECTED: u32 = 1 << 9;
     /// The model is marked untrained and the configuration does not allow that.
     pub const UNTRAINED: u32 = 1 << 10;

@@ -6,20 +6,20 @@ use iceoryx2::prelude::ZeroCopySend;
 /// Layout version of [`CorrectedPose`]; also the `.v1` of its type name.
 pub const POSE_VERSION: u32 = 1;
 
-/// The estimate for one arm. All positions in frame 0 of the arm, micrometres.
+/// The estimate for one arm, in frame 0 of the arm: positions in micrometres, rotations in degrees.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
 #[type_name("ArmPose.v1")]
 pub struct ArmPose {
-    /// An [`ArmStatus`]: use `corrected_position_um` only when it is `valid`.
+    /// An [`ArmStatus`]: use `corrected_position_um` and `corrected_orientation` only when it is `valid`.
     pub status: u32,
     /// Bits of [`crate::flag`]: why, and what else to know.
     pub flags: u32,
-    /// First eight bytes of the model file's SHA-256, big-endian (prints as the hash begins); 0 without a model.
+    /// First eight bytes of the SHA-256 of the position's model file, big-endian (prints as the hash begins); 0 without a model.
     pub model_id: u64,
     /// Goes up by one whenever the correction drops to zero at once (an announced step); a restarted service begins with another one.
     pub reset_count: u32,
-    /// Distance from the trained domain, 1 = its edge; -1 where it was not computed.
+    /// Distance from the trained domain, 1 = its edge, the larger one of the arm's models; -1 where it was not computed.
     pub domain_score: f32,
     /// Position as RAVEN reports it, µm.
     pub raw_position_um: [f64; 3],

@@ -1,6 +1,6 @@
 //! The units and quirks of `raven_state`: slots, micrometres, degrees, and `jac_vel` (ravenstate.md, sections 1 and 2).
 
-use nalgebra::IsometryMatrix3;
+use nalgebra::{IsometryMatrix3, Matrix3, Rotation3};
 
 use crate::{JOINTS, Joints, Side};
 
@@ -20,6 +20,15 @@ pub fn position_um(tip: &IsometryMatrix3<f64>) -> [i32; 3] {
 pub fn rotation_row_major(tip: &IsometryMatrix3<f64>) -> [f32; 9] {
     let matrix = tip.rotation.matrix();
     std::array::from_fn(|i| matrix[(i / 3, i % 3)] as f32)
+}
+
+/// The rotation that was published as these nine numbers, row-major; none where they are no rotation to 1e-3, as where none was published.
+pub fn rotation(row_major: &[f32; 9]) -> Option<Rotation3<f64>> {
+    let matrix = Matrix3::from_row_iterator(row_major.iter().map(|value| f64::from(*value)));
+    let off = matrix.transpose() * matrix - Matrix3::identity();
+    // Written so that NaN fails; a reflection is no rotation.
+    let is_rotation = off.iter().all(|value| value.abs() <= 1e-3) && matrix.determinant() > 0.0;
+    is_rotation.then(|| Rotation3::from_matrix_unchecked(matrix))
 }
 
 /// One number per joint, as it stands in the eight slots of an arm.
@@ -64,4 +73,22 @@ pub fn jac_vel(side: Side, joints: &Joints, speeds: &Joints) -> [f32; 6] {
         kappa * (2.0 * c * c5 + row_5) * v1 + (c * c5 + row_5) * v2,
     ]
     .map(|value| value as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_rotation_is_none() {
+        let turn = Rotation3::from_euler_angles(0.3, -1.2, 2.5);
+        let published = rotation_row_major(&IsometryMatrix3::from_parts(nalgebra::Translation3::identity(), turn));
+        assert!(rotation(&published).expect("a rotation").angle_to(&turn) < 1e-6);
+        assert_eq!(rotation(&[0.0; 9]), None, "nothing was published");
+        let mut broken = published;
+        broken[4] = f32::NAN;
+        assert_eq!(rotation(&broken), None);
+        assert_eq!(rotation(&published.map(|value| -value)), None, "a reflection");
+        assert_eq!(rotation(&published.map(|value| 1.01 * value)), None);
+    }
 }

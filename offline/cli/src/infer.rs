@@ -2,6 +2,7 @@
 //! the 118 features alone; with `--in-order` a model's memory goes from row to row as in the service.
 
 use crate::output;
+use ravenpose::correction::Quantity;
 use ravenpose::cycle::Estimator;
 use ravenpose::model::{self, Estimate};
 use ravenpose::network::{Format, choose};
@@ -17,11 +18,12 @@ pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in
         choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
     let mut estimate = Estimate::new(&network, choice.plan);
     if format != Format::F32 {
-        let um = |mm: f64| mm * 1000.0;
+        let unit =
+            network.metadata.get("ravenpose.units").and_then(|units| Quantity::of_units(units)).unwrap_or_default().thousandth();
         complain!(
-            "weights {format}: at most {:.2} um from float64, {:.2} um RMS, over {} random inputs",
-            um(choice.deviation.worst),
-            um(choice.deviation.rms),
+            "weights {format}: at most {:.2} {unit} from float64, {:.2} {unit} RMS, over {} random inputs",
+            choice.deviation.worst * 1000.0,
+            choice.deviation.rms * 1000.0,
             choice.deviation.inputs
         );
     }
@@ -40,19 +42,19 @@ pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in
         while reader.read_record(&mut record).map_err(|cause| format!("{name}: {}; make all rows alike", one_line(&cause)))? {
             let line = record.position().map_or(0, csv::Position::line);
             let features = features(&name.to_string(), line, &columns, &record)?;
-            let mut error_mm = [0.0_f32; 3];
+            let mut error = [0.0_f32; 3];
             if !in_order {
                 estimate.forget();
             }
             // A period apart, as states are.
             estimate.follow(&features, rows as i64 * 1_000_000);
-            estimate.run(&features, &mut error_mm);
-            if let Some(value) = error_mm.iter().find(|value| !value.is_finite()) {
+            estimate.run(&features, &mut error);
+            if let Some(value) = error.iter().find(|value| !value.is_finite()) {
                 return Err(format!(
                     "{name}:{line}: the network's output is {value}; the row is far outside what it was trained on"
                 ));
             }
-            writeln!(file, "{},{},{}", error_mm[0], error_mm[1], error_mm[2]).map_err(failed)?;
+            writeln!(file, "{},{},{}", error[0], error[1], error[2]).map_err(failed)?;
             rows += 1;
         }
         if rows == 0 {

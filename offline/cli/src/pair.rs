@@ -42,11 +42,8 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         return Err("--offset-s: must be a number of seconds".to_owned());
     }
     let format = StateFormat::of_name(out);
-    if let Some(format @ (StateFormat::StateFile | StateFormat::Columns235)) = format {
-        return Err(format!(
-            "{}: {format:?} holds no truth; name the output .csv, .mcap, .bag, .252.csv or .parquet",
-            out.display()
-        ));
+    if let Some(format @ (StateFormat::StateFile | StateFormat::Columns235 | StateFormat::Columns252)) = format {
+        return Err(format!("{}: {format:?} holds no true tip; name the output .csv, .mcap, .bag or .parquet", out.display()));
     }
     if [run].into_iter().chain(wish.truth).any(|input| same_file(input, out)) {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
@@ -74,8 +71,12 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         }
     }
     let paired = pair(&reported, &frames, &options).map_err(|error| format!("{}: {error}", run.display()))?;
+    if wish.mounting_known && paired.report.orientation.is_none() {
+        let what = "--mounting-known: states and truth do not both have orientations";
+        return Err(format!("{}: {what}; leave it out, or give a truth with qw, qx, qy, qz", run.display()));
+    }
     if let Some(format) = format {
-        recording_with_truth(run, &paired, !wish.same, out, format)?;
+        recording_with_truth(wish, &paired, format)?;
     } else {
         let text = table(&paired, &recording);
         output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
@@ -94,13 +95,8 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
 
 /// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that
 /// the recording held for that arm is left out.
-fn recording_with_truth(
-    run: &Path,
-    paired: &recordings::pairs::Paired,
-    measured: bool,
-    out: &Path,
-    format: StateFormat,
-) -> Result<(), String> {
+fn recording_with_truth(wish: &Wish, paired: &recordings::pairs::Paired, format: StateFormat) -> Result<(), String> {
+    let (run, out) = (wish.run, wish.out);
     let Opened::States(mut source) = open(run).map_err(|error| error.to_string())? else {
         let remedy = "name the output .csv for the table of pairs, or convert the run to .mcap first";
         return Err(format!(
@@ -110,9 +106,8 @@ fn recording_with_truth(
         ));
     };
     let mut metadata = source.metadata().to_vec();
-    let (key, value) = stream::TRUTH_MEASURED;
-    metadata.retain(|(other, _)| other != key);
-    if measured {
+    if !wish.same && !stream::is_truth_measured(&metadata) {
+        let (key, value) = stream::TRUTH_MEASURED;
         metadata.push((key.to_owned(), value.to_owned()));
     }
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
@@ -129,7 +124,8 @@ fn recording_with_truth(
                 while let Some(pair) = pairs.next_if(|pair| at_ns(pair.state_time_s) < time_ns) {
                     let truth = stream::Truth {
                         position_m: pair.truth_m,
-                        quaternion_wxyz: pair.truth_wxyz.unwrap_or([f64::NAN; 4]),
+                        // With a fitted mounting it is the truth but for a constant: not to be learnt from.
+                        quaternion_wxyz: pair.truth_wxyz.filter(|_| wish.mounting_known).unwrap_or([f64::NAN; 4]),
                         ..stream::Truth::unknown(at_ns(pair.state_time_s), side)
                     };
                     sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;

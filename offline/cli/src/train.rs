@@ -46,14 +46,14 @@ pub(crate) struct Source {
     /// At most so many rows per second of truth
     #[arg(long, default_value_t = 30.0)]
     truth_hz: f64,
-    /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, in the unit of what is learnt (mm); a truth that was
+    /// Noise to add to an exact truth (a simulation's), standard deviation in 3D, in mm, or in degrees of an orientation; a truth that was
     /// measured, as `ravenpose pair` notes it, is given none
     #[arg(long, default_value_t = 0.0)]
     truth_noise: f64,
     /// Arm of a RAVEN-II, gold or green
     #[arg(long, default_value = "gold", value_parser = side)]
     arm: Side,
-    /// What of the tip is learnt; the service corrects positions alone
+    /// What of the tip is learnt: the service takes one model for each
     #[arg(long, default_value = "position", value_parser = Quantity::NAMES, conflicts_with = "inputs")]
     target: String,
     #[command(flatten)]
@@ -71,7 +71,7 @@ impl Source {
             return Err(format!("--truth-hz {}: must be above 0 and at most 1000; write --truth-hz 30", self.truth_hz));
         }
         if !(0.0..=100.0).contains(&self.truth_noise) {
-            return Err(format!("--truth-noise {}: must be from 0 to 100 mm; write --truth-noise 0.5", self.truth_noise));
+            return Err(format!("--truth-noise {}: must be from 0 to 100; write --truth-noise 0.5", self.truth_noise));
         }
         if let Some(width) = self.columns.plays.iter().find(|width| !(width.is_finite() && **width > 0.0)) {
             return Err(format!("--plays {width}: half widths are numbers above 0"));

@@ -148,14 +148,18 @@ fn seen_by_cameras(run: &str, folder: &Folder) -> PathBuf {
     let table = std::fs::read_to_string(table).expect("table");
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().expect("header").split(',').collect();
-    let at = ["t_s", "truth_x_mm", "truth_y_mm", "truth_z_mm"]
+    let at = ["t_s", "truth_x_mm", "truth_y_mm", "truth_z_mm", "truth_qw", "truth_qx", "truth_qy", "truth_qz"]
         .map(|name| header.iter().position(|column| *column == name).unwrap_or_else(|| panic!("{name} in {header:?}")));
-    let mut frames = String::from("frame,t_s,x_mm,y_mm,z_mm,status\n");
+    let mut frames = String::from("frame,t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,status\n");
     for (row, line) in lines.enumerate().filter(|(row, _)| row % 66 == 0) {
         let cells: Vec<&str> = line.split(',').collect();
-        let [t_s, x, y, z] = at.map(|column| cells[column].parse::<f64>().unwrap_or(f64::NAN));
+        let [t_s, x, y, z, q @ ..] = at.map(|column| cells[column].parse::<f64>().unwrap_or(f64::NAN));
         if row >= 660 && x.is_finite() {
-            let _ = writeln!(frames, "{},{:.6},{},{},{},ok", row / 66, t_s - 0.4, y + 200.0, 100.0 - x, z - 300.0);
+            // A quarter turn back about z.
+            let half = std::f64::consts::FRAC_1_SQRT_2;
+            let [qw, qx, qy, qz] = [q[0] + q[3], q[1] + q[2], q[2] - q[1], q[3] - q[0]].map(|sum| half * sum);
+            let place = format!("{},{},{},{qw},{qx},{qy},{qz}", y + 200.0, 100.0 - x, z - 300.0);
+            let _ = writeln!(frames, "{},{:.6},{place},ok", row / 66, t_s - 0.4);
         }
     }
     std::fs::write(&out, frames).expect("truth");
@@ -193,12 +197,16 @@ fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
         good(&ravenpose(&["pair", text(run), "--truth", text(&truth), "--cameras", text(&known), "--out", text(&file)]));
         seen.push(file);
     }
-    let labels = |files: &[PathBuf]| {
-        let reading = Reading { truth_hz: 14.0, ..Reading::default() };
-        let set = data::read(files, &reading, &mut |_, _| {}).expect("runs");
+    let read = |files: &[PathBuf], target| {
+        let reading = Reading { truth_hz: 14.0, target, ..Reading::default() };
+        data::read(files, &reading, &mut |_, _| {})
+    };
+    let labels_of = |files: &[PathBuf], target| {
+        let set = read(files, target).expect("runs");
         let squares: f64 = set.trajectories.iter().flat_map(|one| &one.exact).map(|mm| f64::from(*mm).powi(2)).sum();
         (set.rows(), (squares / set.rows() as f64).sqrt())
     };
+    let labels = |files: &[PathBuf]| labels_of(files, Quantity::Position);
     let ((rows, found), (_, expected)) = (labels(&seen), labels(&runs));
     assert!(rows > 300 && expected > 1.0, "{rows} {expected}");
     // But for frames at standstill, which are left out, and for what of a lag the fitted clock takes.
@@ -206,13 +214,19 @@ fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
     // With the clock known as well nothing of the arm's own lag is taken for one.
     let exact = folder.file("exact.mcap");
     let truth = seen_by_cameras(text(&runs[0]), &folder);
-    let clock = ["--clock-known", "--offset-s", "0.4"];
+    // A fitted mounting of the balls holds a part of the arm's error: such orientations are not learnt from.
+    let line = read(&seen, Quantity::Orientation).expect_err("no true orientation").to_string();
+    assert!(line.contains("no true orientation of the tip"), "{line}");
+    let clock = ["--clock-known", "--offset-s", "0.4", "--mounting-known"];
     good(&ravenpose(
         &[&["pair", text(&runs[0]), "--truth", text(&truth), "--cameras", text(&known), "--out", text(&exact)], &clock[..]]
             .concat(),
     ));
     let ((rows, found), (_, expected)) = (labels(std::slice::from_ref(&exact)), labels(&runs[..1]));
     assert!(rows > 100 && (found / expected - 1.0).abs() < 0.01, "{rows}: {found} {expected}");
+    let turned = |file: &PathBuf| labels_of(std::slice::from_ref(file), Quantity::Orientation);
+    let ((rows, found), (_, expected)) = (turned(&exact), turned(&runs[0]));
+    assert!(rows > 100 && expected > 1.0 && (found / expected - 1.0).abs() < 0.01, "{rows}: {found} {expected} deg");
     let (model, seen) = (folder.file("model.onnx"), seen.iter().map(|file| text(file)).collect::<Vec<_>>());
     let options = ["train", "--epochs", "2", "--truth-noise", "0.5", "--out", text(&model), "--data"];
     let done = ravenpose(&[&options[..], &seen].concat());
@@ -226,7 +240,8 @@ fn a_lab_with_cameras_pairs_its_runs_and_trains_on_them() {
     let table = folder.file("run.csv");
     for (input, output, words) in [
         (&table, "made.mcap", "is a table, not a recording of states"),
-        (&runs[3], "made.rvs", "holds no truth"),
+        (&runs[3], "made.rvs", "holds no true tip"),
+        (&runs[3], "made.252.csv", "holds no true tip"),
         (&runs[3], "runs/run_0004.mcap", "both input and output"),
     ] {
         let refused = ravenpose(&[

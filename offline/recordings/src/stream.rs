@@ -26,7 +26,7 @@ impl Record {
 }
 
 /// Metadata of a recording whose truth was measured, not simulated.
-pub const TRUTH_MEASURED: (&str, &str) = ("truth", "measured");
+pub const TRUTH_MEASURED: (&str, &str) = ("truth_source", "measured");
 
 /// Was the truth of a recording with such metadata measured? False where it does not say.
 pub fn is_truth_measured(metadata: &[(String, String)]) -> bool {

@@ -18,9 +18,6 @@ use std::path::{Path, PathBuf};
 /// One row of training in so many has a memory that began a few seconds before.
 pub(crate) const YOUNG_EVERY: usize = 8;
 
-/// Property of the card: what of a RAVEN-II's tip the model gives.
-pub(crate) const TARGET: &str = "ravenpose.target";
-
 /// What is to be trained.
 #[derive(Debug, Clone)]
 pub struct Wish<'a> {
@@ -221,7 +218,6 @@ fn more(wish: &Wish, parts: &Parts, set: &DataSet) -> BTreeMap<String, String> {
         ("ravenpose.truth_hz".to_owned(), wish.reading.truth_hz.to_string()),
         (truth_noise_key(wish.reading.target), wish.reading.truth_noise.to_string()),
         ("ravenpose.recipe".to_owned(), recipe),
-        (TARGET.to_owned(), wish.reading.target.name().to_owned()),
     ]);
     if !set.is_raven {
         more.insert("ravenpose.inputs".to_owned(), set.input_names.join(" "));

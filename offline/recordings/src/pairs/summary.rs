@@ -92,7 +92,7 @@ fn label(labels: &[[f64; 3]], noise_sd_m: [f64; 3]) -> LabelReport {
     }
 }
 
-fn notes(aligned: &Aligned, motion: &Motion) -> Vec<String> {
+fn notes(aligned: &Aligned, motion: &Motion, has_fitted_mounting: bool) -> Vec<String> {
     let mut notes = aligned.notes.clone();
     if aligned.free.rigid {
         notes.push(
@@ -106,6 +106,12 @@ fn notes(aligned: &Aligned, motion: &Motion) -> Vec<String> {
         notes.push(format!(
             "the clock was fitted to these points: a lag of the arm that grows with its speed is in it; 1 ms is {mm_per_ms:.3} mm at the RMS speed"
         ));
+    }
+    if has_fitted_mounting {
+        notes.push(
+            "the fixture's mounting was fitted to these orientations: a constant turn of the end effector is in it and not in the labels"
+                .to_owned(),
+        );
     }
     notes
 }
@@ -155,7 +161,7 @@ pub(super) fn paired(
         registration: registration(&aligned.fit, aligned.free.rigid),
         label: label(&labels, drops.noise_sd_m),
         orientation,
-        notes: notes(aligned, &motion),
+        notes: notes(aligned, &motion, turned.is_some() && !options.mounting_known),
     };
     Paired { pairs, fates: drops.fates, clock: aligned.fit.clock, registration: rigid, report }
 }

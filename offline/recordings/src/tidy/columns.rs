@@ -1,8 +1,8 @@
 //! Names and values of the columns.
 
-use arm::published::SLOT_OF_JOINT;
+use arm::published::{self, SLOT_OF_JOINT};
 use arm::{Arm, JOINTS, Side};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 use ravenpose_wire::RavenState;
 
 use crate::sample;
@@ -96,7 +96,7 @@ impl ArmColumns {
         row.extend(radians(&state.jpos_d));
         row.extend(state.pos[first_axis..first_axis + 3].iter().map(|um| f64::from(*um) / 1e3));
         if self.orientation {
-            row.extend(quaternion_wxyz(&state.ori[3 * first_axis..3 * first_axis + 9]));
+            row.extend(quaternion_wxyz(&std::array::from_fn(|place| state.ori[3 * first_axis + place])));
         }
         if let Some(truth) = truth {
             self.push_truth(row, truth, time_ns);
@@ -117,14 +117,10 @@ impl ArmColumns {
 }
 
 /// Of a published rotation matrix, row-major; NaN where it is none.
-fn quaternion_wxyz(rows: &[f32]) -> [f64; 4] {
-    let matrix = Matrix3::from_row_iterator(rows.iter().map(|value| f64::from(*value)));
-    // Published in float32; what is further off is no rotation, as where nothing was published.
-    if (matrix.transpose() * matrix - Matrix3::identity()).amax() > 1e-3 {
-        return [f64::NAN; 4];
-    }
-    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
-    let turned = UnitQuaternion::new_normalize(*turned);
+fn quaternion_wxyz(row_major: &[f32; 9]) -> [f64; 4] {
+    let Some(rotation) = published::rotation(row_major) else { return [f64::NAN; 4] };
+    // Of a matrix in float32.
+    let turned = UnitQuaternion::new_normalize(*UnitQuaternion::from_rotation_matrix(&rotation));
     [turned.w, turned.i, turned.j, turned.k]
 }
 

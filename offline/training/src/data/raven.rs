@@ -3,8 +3,8 @@
 use super::memory;
 use super::{DataSet, Reading, Trajectory, outputs_of};
 use crate::error::{TrainingError, shown};
-use arm::{Raven2, Side};
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
+use arm::{Raven2, Side, published};
+use nalgebra::{Quaternion, UnitQuaternion};
 use ravenpose::correction::Quantity;
 use ravenpose::guard::Guard;
 use ravenpose::memory::{Memory, Play, may_follow_recorded};
@@ -196,13 +196,21 @@ impl<'a> Pairing<'a> {
             let what = format!("{} is not a number {time_s:.3} s after the first truth", features::name(feature));
             return Some(self.unfit(what, "remove the row or record again"));
         }
-        let (limit, how) = match self.target {
-            Quantity::Position => (ERROR_MAX_MM, "mm apart"),
-            Quantity::Orientation => (ERROR_MAX_DEG, "deg turned against each other"),
+        let (limit, how, remedy) = match self.target {
+            Quantity::Position => (
+                ERROR_MAX_MM,
+                "mm apart",
+                "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm",
+            ),
+            Quantity::Orientation => (
+                ERROR_MAX_DEG,
+                "deg turned against each other",
+                "the truth's frame, the fixture's axes or the order w, x, y, z contradict the states; pair it with frame and mounting known",
+            ),
         };
         (norm(label) > limit).then(|| {
             let what = format!("truth and reported tip are {:.0} {how} {time_s:.3} s after the first truth", norm(label));
-            self.unfit(what, "units or frame of the truth contradict the states; register it to frame 0 of the arm in mm")
+            self.unfit(what, remedy)
         })
     }
 
@@ -218,9 +226,8 @@ impl<'a> Pairing<'a> {
     fn turn(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
         let [w, x, y, z] = truth.quaternion_wxyz;
         let (reported, there) = if truth.quaternion_wxyz.iter().all(|part| part.is_finite()) {
-            let rows = &state.ori[9 * self.side.index()..][..9];
-            let matrix = Matrix3::from_row_iterator(rows.iter().map(|part| f64::from(*part)));
-            let reported = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+            let row_major = std::array::from_fn(|place| state.ori[9 * self.side.index() + place]);
+            let reported = UnitQuaternion::from_rotation_matrix(&published::rotation(&row_major)?);
             // Of a matrix in float32.
             (UnitQuaternion::new_normalize(*reported), UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)))
         } else {

@@ -5,7 +5,7 @@ mod domain;
 mod metrics;
 mod page;
 
-use crate::commands::{Model, TARGET, truth_noise_key, write_whole};
+use crate::commands::{Model, truth_noise_key, write_whole};
 use crate::data::{self, Reading, Sketch, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::rivals;
@@ -239,7 +239,7 @@ fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajector
 /// [`TrainingError`]: model, data, or a folder that cannot be written.
 pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
     let model = Model::read(wish.model)?;
-    let target = model.card.get(TARGET).and_then(|name| Quantity::of_name(name)).unwrap_or_default();
+    let target = model.card.get("ravenpose.units").and_then(|units| Quantity::of_units(units)).unwrap_or_default();
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
         truth_noise: model.number(&truth_noise_key(target)).unwrap_or(0.0),
