@@ -27,7 +27,7 @@ const STOP_TICKS: u32 = 500;
 const STOP_TICK: Duration = Duration::from_millis(1);
 
 const USAGE: &str = "\
-ravenposed - corrects the end-effector position of a RAVEN-II in hard real time
+ravenposed - corrects the end-effector pose of a RAVEN-II in hard real time
 Research software, no clinical use.
 
 usage: ravenposed [--config FILE] [--check-config]
