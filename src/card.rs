@@ -8,10 +8,13 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Properties that depend on what a model corrects.
-struct Keys {
-    bound: &'static str,
-    bound95: &'static str,
-    bound95_unsettled: &'static str,
+pub struct Keys {
+    /// Longest correction that the model stands for.
+    pub bound: &'static str,
+    /// 95 % half widths.
+    pub bound95: &'static str,
+    /// The same while the memory has not settled.
+    pub bound95_unsettled: &'static str,
     /// Correction bound of a card that states none.
     default_bound: f64,
 }
@@ -25,12 +28,14 @@ impl Quantity {
         }
     }
 
-    /// Of a card's units; none for others.
-    pub fn of_units(units: &str) -> Option<Self> {
+    /// What a model corrects by the units on its card; none for others.
+    pub fn of_card(metadata: &BTreeMap<String, String>) -> Option<Self> {
+        let units = metadata.get("ravenpose.units")?;
         [Self::Position, Self::Orientation].into_iter().find(|quantity| quantity.units() == units)
     }
 
-    const fn keys(self) -> Keys {
+    /// Where a card states what depends on it.
+    pub const fn keys(self) -> Keys {
         match self {
             // The paper reports errors up to 10 mm.
             Self::Position => Keys {
@@ -123,7 +128,8 @@ pub struct Card {
 }
 
 impl Card {
-    /// Reads the card of a model that is to correct `quantity`. A model without `ravenpose.trained_on` counts as untrained and need not state a domain.
+    /// Reads the card of a model that is to correct `quantity`. A model without `ravenpose.trained_on` counts as untrained and need not
+    /// state a domain.
     ///
     /// # Errors
     /// [`CardError`].
@@ -131,7 +137,7 @@ impl Card {
         let get = |key: &str| metadata.get(key).map(String::as_str);
         let trained_on = get("ravenpose.trained_on").unwrap_or("").trim().to_owned();
         let untrained = trained_on.is_empty() || trained_on.starts_with("nothing");
-        if let Some(found) = get("ravenpose.units").and_then(Quantity::of_units).filter(|found| *found != quantity) {
+        if let Some(found) = Quantity::of_card(metadata).filter(|found| *found != quantity) {
             return Err(CardError::OtherQuantity { found: found.name(), expected: quantity.name() });
         }
         for (key, expected) in [("ravenpose.feature_layout", features::LAYOUT), ("ravenpose.units", quantity.units())] {

@@ -3,7 +3,6 @@
 //! The same for the tip's position and for its orientation. Numbers are in the unit of the message: µm, and degrees of a rotation vector
 //! in the axes of frame 0.
 
-use crate::cycle::{Estimator, Judgement};
 use crate::guard::{Allowed, Guard};
 use crate::memory::may_follow;
 use nalgebra::Vector3;
@@ -77,6 +76,45 @@ pub struct Pace {
     pub envelope: f64,
 }
 
+/// What evaluates the network: 118 features to the error of a position in mm, or of an orientation in degrees. Nothing here may allocate,
+/// block or panic.
+pub trait Estimator {
+    /// Does its answer depend on the states before?
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// Takes in a state of a time that rises, ns; it is the newest from now on.
+    fn follow(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
+
+    /// Forgets all states: the arm may have moved unseen.
+    fn forget(&mut self) {}
+
+    /// Has it seen enough of the motion?
+    fn is_settled(&self) -> bool {
+        true
+    }
+
+    /// Takes in the features that it followed last, of a state in which the motors hold the arm: what do they hold?
+    fn weigh(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
+
+    /// What the arm seems to carry over what it may carry for this to be trusted: above 1 it may not. None where nobody looks.
+    fn load_score(&self) -> Option<f32> {
+        None
+    }
+
+    /// Has it seen enough motion to tell? Until then a load may be there.
+    fn has_weighed(&self) -> bool {
+        true
+    }
+
+    /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
+    fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]);
+
+    /// Does a microsecond's worth of what makes the next run fast; changes no result.
+    fn keep_warm(&mut self) {}
+}
+
 /// A model as the cycle uses it.
 pub struct Model<E> {
     /// The network.
@@ -105,6 +143,13 @@ pub enum ArmModel<E> {
     Rejected,
     /// A loaded model.
     Loaded(Box<Model<E>>),
+}
+
+/// What one arm's inputs and outputs came to, before the history is considered.
+pub(crate) struct Judgement {
+    pub(crate) reasons: u32,
+    pub(crate) information: u32,
+    pub(crate) score: f32,
 }
 
 /// A model and the correction that follows its answers.

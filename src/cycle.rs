@@ -4,7 +4,7 @@
 //! are those of `docs/flags.md`: anything doubtful yields the raw pose with correction zero in the same cycle and a flag that says
 //! why; the correction comes back after 100 good cycles in a row, slewed.
 
-use crate::correction::{Corrector, Pace, Quantity};
+use crate::correction::{ArmModel, Corrector, Estimator, Judgement, Pace, Quantity};
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
@@ -17,47 +17,6 @@ const PLACES: usize = 2 * ARMS;
 const WARM_ROUNDS: usize = 16;
 /// A larger gap in the sequence is a restart of the source, not a loss.
 const GAP_MAX: u64 = 10_000;
-
-pub use crate::correction::{ArmModel, Model};
-
-/// What evaluates the network: 118 features to the error of a position in mm, or of an orientation in degrees. Nothing here may allocate,
-/// block or panic.
-pub trait Estimator {
-    /// Does its answer depend on the states before?
-    fn remembers(&self) -> bool {
-        false
-    }
-
-    /// Takes in a state of a time that rises, ns; it is the newest from now on.
-    fn follow(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
-
-    /// Forgets all states: the arm may have moved unseen.
-    fn forget(&mut self) {}
-
-    /// Has it seen enough of the motion?
-    fn is_settled(&self) -> bool {
-        true
-    }
-
-    /// Takes in the features that it followed last, of a state in which the motors hold the arm: what do they hold?
-    fn weigh(&mut self, _features: &[f32; FEATURES], _time_ns: i64) {}
-
-    /// What the arm seems to carry over what it may carry for this to be trusted: above 1 it may not. None where nobody looks.
-    fn load_score(&self) -> Option<f32> {
-        None
-    }
-
-    /// Has it seen enough motion to tell? Until then a load may be there.
-    fn has_weighed(&self) -> bool {
-        true
-    }
-
-    /// Evaluates the features that it followed last; where it followed none, as one that has seen these alone.
-    fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]);
-
-    /// Does a microsecond's worth of what makes the next run fast; changes no result.
-    fn keep_warm(&mut self) {}
-}
 
 /// Limits of the cycle; see `docs/configuration.md`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -459,13 +418,6 @@ impl<E: Estimator> Cycle<E> {
         self.finish(now_ns, true, pose);
         true
     }
-}
-
-/// What one arm's inputs and outputs came to, before the history is considered.
-pub(crate) struct Judgement {
-    pub(crate) reasons: u32,
-    pub(crate) information: u32,
-    pub(crate) score: f32,
 }
 
 impl<E: Estimator> Arm<E> {

@@ -3,8 +3,7 @@
 
 use crate::card::{Card, CardError, Golden};
 use crate::config::{self, ModelSource, shown_path};
-use crate::correction::Model;
-use crate::cycle::Estimator;
+use crate::correction::{Estimator, Model};
 use crate::guard::Guard;
 use crate::load::{LoadCard, LoadObserver};
 use crate::memory::Memory;

@@ -4,7 +4,8 @@
 //! `tests/realtime.rs` proves it over a million turns.
 
 use crate::config::Wait;
-use crate::cycle::{Cycle, Estimator, Limits, Stopwatch};
+use crate::correction::Estimator;
+use crate::cycle::{Cycle, Limits, Stopwatch};
 use crate::histogram::{Recorder, Stage};
 use crate::phase::{Found, PhaseLock};
 use crate::shared::{Event, EventSender, LinkCounters, Shared};
@@ -445,7 +446,7 @@ fn offer_each<E: Estimator>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cycle::ArmModel;
+    use crate::correction::ArmModel;
     use crate::model::Estimate;
     use std::cell::Cell;
 

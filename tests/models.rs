@@ -8,8 +8,7 @@ use common::{Rng, TempDir};
 use onnx::{Onnx, Small, words};
 use ravenpose::card::Card;
 use ravenpose::config::ModelSource;
-use ravenpose::correction::Quantity;
-use ravenpose::cycle::Model;
+use ravenpose::correction::{Model, Quantity};
 use ravenpose::model::{self, Estimate};
 use ravenpose::network::Format;
 use ravenpose_wire::{FEATURES, features};
@@ -420,7 +419,7 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
     let load = card.load.expect("load");
     assert_eq!((load.weight, load.travel_deg, load.limit_kg), ([1.0, 2.0, 3.0], [10.0, 20.0, 30.0], 0.25));
     assert!(load.expected.iter().all(|row| row.len() == 122) && load.pull == [[0.5; 4]; 3]);
-    assert_eq!(ravenpose::cycle::Estimator::load_score(&model.estimator), Some(0.0));
+    assert_eq!(ravenpose::correction::Estimator::load_score(&model.estimator), Some(0.0));
     for key in
         ["load_expected", "load_pull", "load_noise_nm", "load_weight", "load_travel_deg", "load_information", "load_limit_kg"]
     {

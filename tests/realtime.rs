@@ -7,7 +7,8 @@ mod proof;
 
 use proof::{Counting, allocator_calls, faults_of, forbid_system_calls_but, nothing_happens, role, thread_id};
 use ravenpose::config::{ModelSource, Wait};
-use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Limits};
+use ravenpose::correction::ArmModel;
+use ravenpose::cycle::{ArmModels, Cycle, Limits};
 use ravenpose::load::{self, LoadCard};
 use ravenpose::memory::Play;
 use ravenpose::model::Estimate;

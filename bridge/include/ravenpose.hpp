@@ -113,20 +113,26 @@ class PoseReader {
   int32_t code_ = RAVENPOSE_NOTHING_NEW;
 };
 
-inline std::optional<Position> position(const ravenpose_pose &pose, uint32_t arm, int64_t now_ns) noexcept {
-  Position result{};
-  const int32_t code = ravenpose_position(&pose, arm, now_ns, result.um.data());
+namespace detail {
+// What a rule gave with this code.
+template <class Result>
+std::optional<Result> ruled(int32_t code, Result result) noexcept {
   if (code < 0) return std::nullopt;
   result.corrected = code == RAVENPOSE_OK;
   return result;
+}
+}  // namespace detail
+
+inline std::optional<Position> position(const ravenpose_pose &pose, uint32_t arm, int64_t now_ns) noexcept {
+  Position result{};
+  const int32_t code = ravenpose_position(&pose, arm, now_ns, result.um.data());
+  return detail::ruled(code, result);
 }
 
 inline std::optional<Orientation> orientation(const ravenpose_pose &pose, uint32_t arm, int64_t now_ns) noexcept {
   Orientation result{};
   const int32_t code = ravenpose_orientation(&pose, arm, now_ns, result.matrix.data());
-  if (code < 0) return std::nullopt;
-  result.corrected = code == RAVENPOSE_OK;
-  return result;
+  return detail::ruled(code, result);
 }
 
 }  // namespace ravenpose

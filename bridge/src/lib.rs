@@ -287,45 +287,48 @@ pub unsafe extern "C" fn ravenpose_pose_reader_close(reader: *mut *mut PoseReade
 /// one, in µm, frame 0 of the arm. Returns `RAVENPOSE_OK` for corrected, `RAVENPOSE_RAW` for raw, a negative code for bad arguments.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ravenpose_position(pose: *const CorrectedPose, arm: u32, now_ns: i64, position_um: *mut f64) -> i32 {
-    // SAFETY: the caller gives null or a valid pose.
-    let (Some(pose), false) = (unsafe { pose.as_ref() }, position_um.is_null()) else { return Code::Null as i32 };
-    let (estimate, usable) = match consume(pose, arm, now_ns) {
-        Ok(found) => found,
-        Err(code) => return code as i32,
-    };
-    let position = if usable { &estimate.corrected_position_um } else { &estimate.raw_position_um };
-    // SAFETY: the caller gives room for three numbers.
-    unsafe { std::ptr::copy_nonoverlapping(position.as_ptr(), position_um, 3) };
-    if usable { Code::Ok as i32 } else { Code::Raw as i32 }
+    // SAFETY: the caller gives null or a valid pose, and null or room for three numbers.
+    unsafe { consume(pose, arm, now_ns, position_um, |arm| (true, &arm.corrected_position_um, &arm.raw_position_um)) }
 }
 
 /// The same for the orientation: nine numbers, row-major. Returns `RAVENPOSE_OK` for corrected, `RAVENPOSE_RAW` for RAVEN's own, also
 /// where no model corrects the orientation, a negative code for bad arguments.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn ravenpose_orientation(pose: *const CorrectedPose, arm: u32, now_ns: i64, orientation: *mut f32) -> i32 {
-    // SAFETY: the caller gives null or a valid pose.
-    let (Some(pose), false) = (unsafe { pose.as_ref() }, orientation.is_null()) else { return Code::Null as i32 };
-    let (estimate, usable) = match consume(pose, arm, now_ns) {
-        Ok((estimate, usable)) => (estimate, usable && estimate.orientation_model_id != 0),
-        Err(code) => return code as i32,
-    };
-    let found = if usable { &estimate.corrected_orientation } else { &estimate.orientation };
-    // SAFETY: the caller gives room for nine numbers.
-    unsafe { std::ptr::copy_nonoverlapping(found.as_ptr(), orientation, 9) };
-    if usable { Code::Ok as i32 } else { Code::Raw as i32 }
+    // SAFETY: the caller gives null or a valid pose, and null or room for nine numbers.
+    unsafe {
+        consume(pose, arm, now_ns, orientation, |arm| (arm.orientation_model_id != 0, &arm.corrected_orientation, &arm.orientation))
+    }
 }
 
-/// An arm's estimate, and whether the consumer rule lets it be used at the time `now_ns`.
-fn consume(pose: &CorrectedPose, arm: u32, now_ns: i64) -> Result<(&ArmPose, bool), Code> {
-    let Some(estimate) = pose.arm.get(arm as usize) else { return Err(Code::Argument) };
+/// The consumer rule: writes an arm's corrected numbers to `room` if they may be used, else the raw ones. `of` an arm: is there a
+/// correction at all, corrected, raw.
+///
+/// # Safety
+/// `pose` is null or valid, `room` is null or has room for `N` numbers.
+unsafe fn consume<T: Copy, const N: usize>(
+    pose: *const CorrectedPose,
+    arm: u32,
+    now_ns: i64,
+    room: *mut T,
+    of: impl Fn(&ArmPose) -> (bool, &[T; N], &[T; N]),
+) -> i32 {
+    // SAFETY: the caller gives null or a valid pose.
+    let (Some(pose), false) = (unsafe { pose.as_ref() }, room.is_null()) else { return Code::Null as i32 };
+    let Some(estimate) = pose.arm.get(arm as usize) else { return Code::Argument as i32 };
     if pose.admit().is_err() {
-        return Err(Code::Torn);
+        return Code::Torn as i32;
     }
     if estimate.status == ArmStatus::Absent as u32 {
-        return Err(Code::Absent);
+        return Code::Absent as i32;
     }
     let fresh = now_ns.saturating_sub(pose.source_time_ns) < RAVENPOSE_POSE_AGE_MAX_NS;
-    Ok((estimate, fresh && estimate.status == ArmStatus::Valid as u32))
+    let (is_corrected, corrected, raw) = of(estimate);
+    let usable = fresh && estimate.status == ArmStatus::Valid as u32 && is_corrected;
+    let numbers = if usable { corrected } else { raw };
+    // SAFETY: the caller gives room for as many numbers.
+    unsafe { std::ptr::copy_nonoverlapping(numbers.as_ptr(), room, N) };
+    if usable { Code::Ok as i32 } else { Code::Raw as i32 }
 }
 
 /// Number of arms in a pose.

@@ -1,7 +1,8 @@
 //! F16: another arm, another run level. No correction in a state that the model's card does not allow.
 
 use crate::world::{Fake, MS, cycle, model, state};
-use ravenpose::cycle::{ArmModel, Cycle, Limits};
+use ravenpose::correction::ArmModel;
+use ravenpose::cycle::{Cycle, Limits};
 use ravenpose::guard::Allowed;
 use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState, flag};
 

@@ -1,8 +1,8 @@
 //! What the pose says while the estimator sees a load that the model was not trained with.
 
 use crate::world::{MS, state};
-use ravenpose::correction::Pace;
-use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::correction::{ArmModel, Estimator, Model, Pace};
+use ravenpose::cycle::{Cycle, Limits};
 use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, flag};
 

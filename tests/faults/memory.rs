@@ -1,8 +1,8 @@
 //! What an estimator with a memory is told to follow and to forget, and what the pose says meanwhile.
 
 use crate::world::{MS, state};
-use ravenpose::correction::Pace;
-use ravenpose::cycle::{ArmModel, Cycle, Estimator, Limits, Model};
+use ravenpose::correction::{ArmModel, Estimator, Model, Pace};
+use ravenpose::cycle::{Cycle, Limits};
 use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
 

@@ -2,8 +2,8 @@
 
 use crate::world::{Bench, MS, TURN_HUGE, TURN_NAN, model, state, turning};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use ravenpose::correction::Pace;
-use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Estimator, Limits, Model};
+use ravenpose::correction::{ArmModel, Estimator, Model, Pace};
+use ravenpose::cycle::{ArmModels, Cycle, Limits};
 use ravenpose::guard::{Allowed, Domain, Guard};
 use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, RavenState, flag};
 

@@ -3,7 +3,8 @@
 use crate::common::Rng;
 use crate::orientation::is_raw;
 use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, model as model_of_world, state};
-use ravenpose::cycle::{ArmModel, Counters, Cycle, Limits};
+use ravenpose::correction::ArmModel;
+use ravenpose::cycle::{Counters, Cycle, Limits};
 use ravenpose::guard::Guard;
 use ravenpose_transport::DEPTH_MAX;
 use ravenpose_wire::{ArmPose, ArmStatus, CorrectedPose, FEATURES, RavenState, features, flag};

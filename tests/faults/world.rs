@@ -1,6 +1,7 @@
 //! A plausible robot for the pure cycle: states that move within all limits, and an estimator with faults on demand.
 
-use ravenpose::cycle::{ArmModel, ArmModels, Cycle, Estimator, Limits, Model};
+use ravenpose::correction::{ArmModel, Estimator, Model};
+use ravenpose::cycle::{ArmModels, Cycle, Limits};
 use ravenpose::guard::{Allowed, Guard};
 use ravenpose_wire::{CorrectedPose, FEATURES, RavenState};
 
@@ -73,29 +74,16 @@ impl Estimator for Fake {
 }
 
 pub(crate) fn model() -> ArmModel<Fake> {
-    ArmModel::Loaded(Box::new(Model {
-        estimator: Fake::default(),
-        guard: Guard::new(None),
-        allowed: Allowed::default(),
-        id: 0x0123_4567_89ab_cdef,
-        bound: BOUND_UM,
-        bound95: [300.0, 400.0, 500.0],
-        bound95_unsettled: [f64::NAN; 3],
-        untrained: false,
-    }))
+    model_of(Fake::default(), 0x0123_4567_89ab_cdef, BOUND_UM, [300.0, 400.0, 500.0])
 }
 
 pub(crate) fn turning() -> ArmModel<Fake> {
-    ArmModel::Loaded(Box::new(Model {
-        estimator: Fake { turns: true, ..Fake::default() },
-        guard: Guard::new(None),
-        allowed: Allowed::default(),
-        id: 0xfedc_ba98_7654_3210,
-        bound: BOUND_DEG,
-        bound95: [0.3, 0.4, 0.5],
-        bound95_unsettled: [f64::NAN; 3],
-        untrained: false,
-    }))
+    model_of(Fake { turns: true, ..Fake::default() }, 0xfedc_ba98_7654_3210, BOUND_DEG, [0.3, 0.4, 0.5])
+}
+
+fn model_of(estimator: Fake, id: u64, bound: f64, bound95: [f64; 3]) -> ArmModel<Fake> {
+    let (guard, allowed, bound95_unsettled) = (Guard::new(None), Allowed::default(), [f64::NAN; 3]);
+    ArmModel::Loaded(Box::new(Model { estimator, guard, allowed, id, bound, bound95, bound95_unsettled, untrained: false }))
 }
 
 /// Both arms with both models.

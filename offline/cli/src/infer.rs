@@ -2,8 +2,7 @@
 //! the 118 features alone; with `--in-order` a model's memory goes from row to row as in the service.
 
 use crate::output;
-use ravenpose::correction::Quantity;
-use ravenpose::cycle::Estimator;
+use ravenpose::correction::{Estimator, Quantity};
 use ravenpose::model::{self, Estimate};
 use ravenpose::network::{Format, choose};
 use std::path::Path;
@@ -18,8 +17,7 @@ pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in
         choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;
     let mut estimate = Estimate::new(&network, choice.plan);
     if format != Format::F32 {
-        let unit =
-            network.metadata.get("ravenpose.units").and_then(|units| Quantity::of_units(units)).unwrap_or_default().thousandth();
+        let unit = Quantity::of_card(&network.metadata).unwrap_or_default().thousandth();
         complain!(
             "weights {format}: at most {:.2} {unit} from float64, {:.2} {unit} RMS, over {} random inputs",
             choice.deviation.worst * 1000.0,

@@ -2,8 +2,7 @@
 #![allow(missing_docs)]
 
 use ravenpose::config::ModelSource;
-use ravenpose::correction::Quantity;
-use ravenpose::cycle::Estimator;
+use ravenpose::correction::{Estimator, Quantity};
 use ravenpose::model;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -116,20 +116,20 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 /// All properties of a model.
 pub fn card(facts: &Facts) -> BTreeMap<String, String> {
     let mut card = facts.more.clone();
-    let mut put = |key: &str, value: String| drop(card.insert(format!("ravenpose.{key}"), value));
-    let (is_raven, unit) = (facts.is_raven, facts.target.unit());
+    let mut put = |key: &str, value: String| drop(card.insert(key.to_owned(), value));
+    let (is_raven, keys) = (facts.is_raven, facts.target.keys());
     let settled = bounds(facts.chain, facts.validation);
-    put("trained_on", facts.trained_on.to_owned());
+    put("ravenpose.trained_on", facts.trained_on.to_owned());
     if is_raven {
-        put("feature_layout", features::LAYOUT.to_owned());
-        put("units", facts.target.units().to_owned());
-        put("runlevels", PEDAL_DOWN.to_string());
+        put("ravenpose.feature_layout", features::LAYOUT.to_owned());
+        put("ravenpose.units", facts.target.units().to_owned());
+        put("ravenpose.runlevels", PEDAL_DOWN.to_string());
         let boards: BTreeSet<i32> = facts.train.iter().chain(facts.validation).map(|one| one.board).collect();
         if !boards.contains(&0) {
-            put("boards", words(&boards.into_iter().collect::<Vec<_>>()));
+            put("ravenpose.boards", words(&boards.into_iter().collect::<Vec<_>>()));
         }
         if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, &settled) {
-            put(&format!("bound95_unsettled_{unit}"), words(&wider));
+            put(keys.bound95_unsettled, words(&wider));
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {
             facts
@@ -140,27 +140,27 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
                 .collect::<Vec<_>>()
         });
         if let Some(load) = facts.load {
-            put("load_expected", load.expected.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
-            put("load_pull", load.pull.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
-            put("load_noise_nm", words(&load.noise_nm));
-            put("load_weight", words(&load.weight));
-            put("load_travel_deg", words(&load.travel_deg));
-            put("load_information", words(&load.information));
-            put("load_limit_kg", load.limit_kg.to_string());
+            put("ravenpose.load_expected", load.expected.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
+            put("ravenpose.load_pull", load.pull.iter().map(|row| words(row)).collect::<Vec<_>>().join("\n"));
+            put("ravenpose.load_noise_nm", words(&load.noise_nm));
+            put("ravenpose.load_weight", words(&load.weight));
+            put("ravenpose.load_travel_deg", words(&load.travel_deg));
+            put("ravenpose.load_information", words(&load.information));
+            put("ravenpose.load_limit_kg", load.limit_kg.to_string());
         }
-        put(&format!("correction_bound_{unit}"), format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
+        put(keys.bound, format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
     }
     let (low, high) = ranges(facts, is_raven);
     let stated = if is_raven { FEATURES } else { facts.chain.inputs() };
-    put("feature_min", words(&low[..stated]));
-    put("feature_max", words(&high[..stated]));
+    put("ravenpose.feature_min", words(&low[..stated]));
+    put("ravenpose.feature_max", words(&high[..stated]));
     let (center, weight, limit) = domain(facts);
-    put("domain_center", words(&center[..stated]));
-    put("domain_weight", words(&weight[..stated]));
-    put("domain_limit", limit.to_string());
-    put(&format!("bound95_{unit}"), words(&settled));
-    put("golden", golden(facts));
-    card.insert(VALIDATION_RMS.to_owned(), validation_rms(facts).to_string());
+    put("ravenpose.domain_center", words(&center[..stated]));
+    put("ravenpose.domain_weight", words(&weight[..stated]));
+    put("ravenpose.domain_limit", limit.to_string());
+    put(keys.bound95, words(&settled));
+    put("ravenpose.golden", golden(facts));
+    put(VALIDATION_RMS, validation_rms(facts).to_string());
     card
 }
 

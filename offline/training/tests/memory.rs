@@ -5,7 +5,7 @@ mod common;
 
 use common::{Folder, runs, small};
 use ravenpose::config::ModelSource;
-use ravenpose::cycle::Estimator;
+use ravenpose::correction::Estimator;
 use ravenpose::load::{self as load_card, LoadCard};
 use ravenpose::model::Estimate;
 use ravenpose::network::{Format, Plan};

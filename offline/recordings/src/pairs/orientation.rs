@@ -44,8 +44,10 @@ pub(super) fn labels(
         })
         .collect();
     let relative: Vec<Rotation3<f64>> = both.iter().flatten().map(|(arm, camera)| arm.inverse() * camera).collect();
-    let fitted = mean(&relative)?;
-    let mounting = if options.mounting_known { Rotation3::identity() } else { fitted };
+    if relative.is_empty() {
+        return None;
+    }
+    let mounting = if options.mounting_known { Rotation3::identity() } else { mean(&relative)? };
     let label = |(arm, camera): (Rotation3<f64>, Rotation3<f64>)| {
         let truth = camera * mounting.inverse();
         let q = UnitQuaternion::from_rotation_matrix(&truth);

@@ -25,8 +25,8 @@ pub(super) fn trust(
     let numbers = |key: &str| -> Vec<f64> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
     // As the inputs are: a constant of a card is exactly its float32.
     let floats = |key: &str| -> Vec<f32> { model.words(key).iter().filter_map(|word| word.parse().ok()).collect() };
-    let key = |name: &str| format!("ravenpose.{name}_{}", target.unit());
-    let (bound95, bound95_unsettled) = (numbers(&key("bound95")), numbers(&key("bound95_unsettled")));
+    let keys = target.keys();
+    let (bound95, bound95_unsettled) = (numbers(keys.bound95), numbers(keys.bound95_unsettled));
     let mut trust = Trust { bound95, bound95_unsettled, ..Trust::default() };
     coverage(&mut trust, test, estimates);
     let (low, high) = (floats("ravenpose.feature_min"), floats("ravenpose.feature_max"));

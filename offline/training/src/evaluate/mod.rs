@@ -239,7 +239,7 @@ fn parts(model: &Model, all: Vec<Trajectory>) -> (Vec<Trajectory>, Vec<Trajector
 /// [`TrainingError`]: model, data, or a folder that cannot be written.
 pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, TrainingError> {
     let model = Model::read(wish.model)?;
-    let target = model.card.get("ravenpose.units").and_then(|units| Quantity::of_units(units)).unwrap_or_default();
+    let target = Quantity::of_card(&model.card).unwrap_or_default();
     let reading = Reading {
         truth_hz: model.number("ravenpose.truth_hz").unwrap_or(wish.reading.truth_hz),
         truth_noise: model.number(&truth_noise_key(target)).unwrap_or(0.0),
