@@ -190,11 +190,20 @@ impl Card {
     }
 
     /// The bound of a memory that has not settled belongs to a memory, and is no narrower than that of a settled one; what watches the
-    /// load looks at as many places as the memory has.
+    /// load looks at as many places as the memory has, and a network that is told of friction has its range on the card.
     ///
     /// # Errors
-    /// [`CardError::Numbers`].
-    pub fn check_memory(&self, plays: usize) -> Result<(), CardError> {
+    /// [`CardError::Missing`] or [`CardError::Numbers`].
+    pub fn check_memory(&self, plays: usize, friction: usize) -> Result<(), CardError> {
+        let known = self.load.as_ref().and_then(|load| load.friction).map_or(0, |known| known.len());
+        if known != friction {
+            return Err(if known == 0 && friction == load::MOTORS {
+                CardError::Missing { key: FRICTION[0] }
+            } else {
+                let problem = format!("{known} numbers, the network takes the friction of {friction} motors");
+                CardError::Numbers { key: FRICTION[0], problem }
+            });
+        }
         let expected = load::expected_len(plays);
         if let Some(row) = self.load.iter().flat_map(|load| &load.expected).find(|row| row.len() != expected) {
             let problem = format!("{} numbers per motor, expected {expected} for {plays} plays", row.len());
@@ -286,8 +295,29 @@ const LOAD: [&str; 7] = [
     "ravenpose.load_limit_kg",
 ];
 
+/// Friction that the network knows, least and largest of each motor.
+const FRICTION: [&str; 2] = ["ravenpose.friction_min_nm", "ravenpose.friction_max_nm"];
+
+fn friction(metadata: &BTreeMap<String, String>) -> Result<Option<[(f32, f32); load::MOTORS]>, CardError> {
+    if FRICTION.iter().all(|key| !metadata.contains_key(*key)) {
+        return Ok(None);
+    }
+    let get = |key: &'static str| -> Result<[f32; load::MOTORS], CardError> {
+        numbers(key, metadata.get(key).ok_or(CardError::Missing { key })?)
+    };
+    let (least, largest) = (get(FRICTION[0])?, get(FRICTION[1])?);
+    // The usual friction is where the observer begins.
+    match least.iter().zip(largest).find(|(least, largest)| !(**least < 0.0 && *largest > 0.0)) {
+        Some((least, largest)) => {
+            let problem = format!("{least} to {largest} does not hold the usual friction, 0");
+            Err(CardError::Numbers { key: FRICTION[0], problem })
+        }
+        None => Ok(Some(std::array::from_fn(|motor| (least[motor], largest[motor])))),
+    }
+}
+
 fn load(metadata: &BTreeMap<String, String>) -> Result<Option<LoadCard>, CardError> {
-    if LOAD.iter().all(|key| !metadata.contains_key(*key)) {
+    if LOAD.iter().chain(&FRICTION).all(|key| !metadata.contains_key(*key)) {
         return Ok(None);
     }
     let get = |key: &'static str| metadata.get(key).map(String::as_str).ok_or(CardError::Missing { key });
@@ -306,6 +336,7 @@ fn load(metadata: &BTreeMap<String, String>) -> Result<Option<LoadCard>, CardErr
         travel_deg: numbers(LOAD[4], get(LOAD[4])?)?,
         information: numbers(LOAD[5], get(LOAD[5])?)?,
         limit_kg: numbers::<1>(LOAD[6], get(LOAD[6])?)?[0],
+        friction: friction(metadata)?,
     };
     // One that pulls nothing would never show anything.
     if card.pull.iter().any(|row| row.iter().all(|term| *term == 0.0)) {

@@ -103,6 +103,11 @@ pub trait Estimator {
         None
     }
 
+    /// How far the motors' friction is from what this was trained with: above 1 it is beyond. None where it does not matter.
+    fn friction_score(&self) -> Option<f32> {
+        None
+    }
+
     /// Has it seen enough motion to tell? Until then a load may be there.
     fn has_weighed(&self) -> bool {
         true
@@ -233,11 +238,12 @@ impl<E: Estimator> Corrector<E> {
         if allowed && verdict.reasons == 0 {
             model.estimator.weigh(features, state.source_time_ns);
         }
-        if let Some(load) = model.estimator.load_score() {
-            judged.score = judged.score.max(load);
-            if !(load <= 1.0) {
+        let torque = [(model.estimator.load_score(), flag::UNSEEN_LOAD), (model.estimator.friction_score(), flag::UNSEEN_FRICTION)];
+        for (score, unseen) in torque.into_iter().filter_map(|(score, unseen)| Some((score?, unseen))) {
+            judged.score = judged.score.max(score);
+            if !(score <= 1.0) {
                 judged.reasons |= flag::OUT_OF_DOMAIN;
-                judged.information |= flag::UNSEEN_LOAD;
+                judged.information |= unseen;
             }
         }
     }

@@ -1,9 +1,10 @@
-//! What the arm carries, as far as it differs from what the model was trained with.
+//! What the arm carries and how hard it goes, as far as that differs from what was usual in training.
 //!
 //! A load shows in no single state: friction leaves more of the motors' torque unexplained than 200 g at the tip add. So what the
 //! torques of motors 1 to 3 have beyond what posture, direction and speed explain is matched with the torque of a mass at the tip
 //! (matched filter, North 1943), and averaged over each motor's own motion: at rest friction says one thing for ever.
-//! `docs/models.md` has the formula.
+//! The same torque with the sign of the motor's speed is its friction beyond the usual, averaged in the same way: it fades as grease warms
+//! up and grows as cables wear, over minutes to months. `docs/models.md` has the formulas.
 
 use ravenpose_wire::FEATURES;
 
@@ -23,6 +24,8 @@ const SHARE_MAX: f64 = 0.01;
 pub const PAUSE_NS: i64 = 200_000_000;
 /// Unexplained torque counts up to so many standard deviations: a push is no load.
 const CLIP: f64 = 4.0;
+/// The friction's average begins as if the usual had been seen for this share of the time over which it is taken.
+const PRIOR: f64 = 0.25;
 /// A load that was seen is gone when less than this share of the limit is left.
 const RELEASE: f64 = 0.6;
 
@@ -43,6 +46,8 @@ pub struct LoadCard {
     pub information: [f32; MOTORS],
     /// Mass at which a load counts as unseen, kg.
     pub limit_kg: f32,
+    /// Least and largest friction of each motor that the network knows, N·m beyond the usual; none if it is not told.
+    pub friction: Option<[(f32, f32); MOTORS]>,
 }
 
 /// Follows one arm. Allocates nothing after [`LoadObserver::new`].
@@ -55,13 +60,15 @@ pub struct LoadObserver {
     /// Of the last state that was used: time, ns, and motor positions, degrees.
     used_ns: i64,
     mpos: Option<[f32; MOTORS]>,
+    /// Averages of the unexplained torque against the motion, N·m.
+    friction: [f64; MOTORS],
     /// Travel of each motor since the start, in terms of that over which its average is taken.
     travelled: [f64; MOTORS],
     is_unseen: bool,
 }
 
 impl LoadObserver {
-    /// One that believes that nothing is carried.
+    /// One that believes that nothing is carried and all motors go as usual.
     pub fn new(card: LoadCard) -> Self {
         let information = card.information.map(f64::from);
         Self {
@@ -70,6 +77,7 @@ impl LoadObserver {
             information,
             used_ns: i64::MIN,
             mpos: None,
+            friction: [0.0; MOTORS],
             travelled: [0.0; MOTORS],
             is_unseen: false,
         }
@@ -96,13 +104,16 @@ impl LoadObserver {
             let unexplained = f64::from(tau[motor]) - affine(&self.card.expected[motor], input.iter().chain(&signs));
             let pull = affine(&self.card.pull[motor], input.iter());
             let most = CLIP * f64::from(self.card.noise_nm[motor]);
-            let (matched, information) = (pull * unexplained.max(-most).min(most), pull * pull);
+            let counted = unexplained.max(-most).min(most);
+            let (matched, information) = (pull * counted, pull * pull);
             // A number beyond all others would stay in the average for ever.
             if [share, unexplained, matched, information].iter().all(|number| number.is_finite()) {
                 let share = share.min(SHARE_MAX);
                 self.matched[motor] += share * (matched - self.matched[motor]);
                 self.information[motor] += share * (information - self.information[motor]);
                 self.travelled[motor] += share;
+                let against = counted * f64::from(signs[motor]);
+                self.friction[motor] += share / (PRIOR + self.travelled[motor]).min(1.0) * (against - self.friction[motor]);
             }
         }
         self.is_unseen = self.mass_kg().abs() > f64::from(self.limit_kg());
@@ -113,6 +124,25 @@ impl LoadObserver {
         let weighted = |averages: [f64; MOTORS]| averages.iter().zip(self.card.weight).map(|(a, w)| a * f64::from(w)).sum::<f64>();
         let information = weighted(self.information);
         if information > 0.0 { weighted(self.matched) / information } else { 0.0 }
+    }
+
+    /// Friction of each motor beyond the usual, N·m.
+    pub fn friction_nm(&self) -> [f32; MOTORS] {
+        self.friction.map(|friction| friction as f32)
+    }
+
+    /// The largest of them, from the middle of what the network knows in units of half its width; above 1 it is unseen. 0 until it has
+    /// weighed, since a young average strays; none for a network that is not told.
+    pub fn friction_score(&self) -> Option<f32> {
+        let off = |(friction, (least, largest)): (f32, &(f32, f32))| {
+            let (middle, half) = (0.5 * (least + largest), 0.5 * (largest - least));
+            ((friction - middle) / half).abs()
+        };
+        let known = self.card.friction.as_ref()?;
+        if !self.has_weighed() {
+            return Some(0.0);
+        }
+        Some(self.friction_nm().into_iter().zip(known).map(off).fold(0.0, f32::max))
     }
 
     /// Have the motors moved far enough since the start for a load to show?
@@ -165,6 +195,7 @@ mod tests {
             travel_deg: [18_000.0; MOTORS],
             information: [0.05 * 0.05; MOTORS],
             limit_kg: 0.1,
+            friction: None,
         })
     }
 
@@ -205,6 +236,44 @@ mod tests {
         // What pulls less than in training is as unknown.
         assert!(carry(&mut watched, -0.2, 5000).is_some());
         assert!(watched.mass_kg() < -0.1);
+    }
+
+    /// So many states of the usual motion under gravity's torque and this friction beyond the usual, N·m.
+    fn rub(observer: &mut LoadObserver, friction_nm: f32, states: usize) {
+        for k in 0..states {
+            let (there, back) = (10.0 * (k % 2) as f32, k % 2 == 0);
+            let speed: f32 = if back { -90.0 } else { 90.0 };
+            let mut seen = input(2.0 + friction_nm * speed.signum(), there);
+            seen[MVEL..MVEL + MOTORS].fill(speed);
+            observer.follow(&seen, observer.used_ns.max(0) + STEP);
+        }
+    }
+
+    #[test]
+    fn friction_is_the_unexplained_torque_against_the_motion_averaged_over_the_way() {
+        let mut watched = observer();
+        watched.card.friction = Some([(-0.1, 0.3); MOTORS]);
+        let scores =
+            |watched: &LoadObserver, wanted: f32| watched.friction_score().is_some_and(|score| (score - wanted).abs() < 0.01);
+        assert_eq!((watched.friction_nm(), watched.friction_score()), ([0.0; MOTORS], Some(0.0)));
+        // Soon after the start what is seen counts more than what was believed: n states of 10 of 18,000 degrees over a quarter and those.
+        rub(&mut watched, 0.2, 600);
+        let early = watched.friction_nm();
+        assert!(early.iter().all(|friction| (0.1..0.16).contains(friction)), "{early:?}");
+        assert_eq!(watched.friction_score(), Some(0.0), "too little motion");
+        rub(&mut watched, 0.2, 20_000);
+        assert!(watched.friction_nm().iter().all(|friction| (friction - 0.2).abs() < 1e-3), "{:?}", watched.friction_nm());
+        // It is no load, and what is beyond the range is unseen: 0.31 is.
+        assert!(watched.mass_kg().abs() < 0.01 && watched.score() < 0.1, "{}", watched.mass_kg());
+        assert!(scores(&watched, 0.5));
+        rub(&mut watched, 0.31, 20_000);
+        assert!(watched.friction_score().is_some_and(|score| score > 1.0));
+        rub(&mut watched, -0.05, 20_000);
+        assert!(scores(&watched, 0.75));
+        // A mass is no friction.
+        let mut carrying = observer();
+        let _ = carry(&mut carrying, 0.2, 20_000);
+        assert_eq!((carrying.friction_nm(), carrying.friction_score()), ([0.0; MOTORS], None));
     }
 
     #[test]

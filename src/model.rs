@@ -134,7 +134,7 @@ pub struct Estimate {
     plan: Plan,
     memory: Memory,
     load: Option<LoadObserver>,
-    /// The features, and behind them where they stand within each play.
+    /// The features, behind them where they stand within each play, and the friction if the network is told.
     input: Box<[f32]>,
 }
 
@@ -142,7 +142,7 @@ impl Estimate {
     /// A network's plan with a memory that has seen nothing.
     pub fn new(network: &Network, plan: Plan) -> Self {
         let memory = Memory::new(&network.plays);
-        Self { plan, input: vec![0.0; FEATURES + memory.len()].into(), memory, load: None }
+        Self { plan, input: vec![0.0; FEATURES + memory.len() + network.friction].into(), memory, load: None }
     }
 
     /// The same with an observer of the load.
@@ -151,11 +151,14 @@ impl Estimate {
         Self { load: load.map(LoadObserver::new), ..self }
     }
 
-    /// Puts the features and where they stand in the memory where plan and observer look for them.
+    /// Puts the features, where they stand in the memory, and the friction where plan and observer look for them.
     fn see(&mut self, features: &[f32; FEATURES]) {
         let (own, places) = self.input.split_at_mut(FEATURES);
         own.copy_from_slice(features);
         self.memory.places(features, places);
+        if let (Some(load), Some(friction)) = (&self.load, places.get_mut(self.memory.len()..)) {
+            friction.iter_mut().zip(load.friction_nm()).for_each(|(out, friction_nm)| *out = friction_nm);
+        }
     }
 
     /// The plan.
@@ -176,8 +179,9 @@ impl Estimator for Estimate {
     fn weigh(&mut self, features: &[f32; FEATURES], time_ns: i64) {
         if self.load.as_ref().is_some_and(|load| load.is_due(time_ns)) {
             self.see(features);
-            if let Some(load) = &mut self.load {
-                load.follow(&self.input, time_ns);
+            let seen = FEATURES + self.memory.len();
+            if let (Some(load), Some(input)) = (&mut self.load, self.input.get(..seen)) {
+                load.follow(input, time_ns);
             }
         }
     }
@@ -189,6 +193,10 @@ impl Estimator for Estimate {
 
     fn load_score(&self) -> Option<f32> {
         self.load.as_ref().map(LoadObserver::score)
+    }
+
+    fn friction_score(&self) -> Option<f32> {
+        self.load.as_ref().and_then(LoadObserver::friction_score)
     }
 
     fn has_weighed(&self) -> bool {
@@ -247,9 +255,9 @@ pub fn load(source: &ModelSource) -> Result<Loaded, ModelError> {
     let card = Card::read(&network.metadata, source.quantity).map_err(unusable)?;
     check_golden(&path, &mut Estimate::new(&network, Plan::new(&network)), &card)?;
     card.check_range().map_err(unusable)?;
-    card.check_memory(network.plays.len()).map_err(unusable)?;
-    // Places of a memory that has seen nothing else are zero.
-    let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len()]].concat();
+    card.check_memory(network.plays.len(), network.friction).map_err(unusable)?;
+    // Places of a memory that has seen nothing else are zero, and so is the friction that is usual.
+    let seen = |golden: &Golden| [&golden.input[..], &vec![0.0; network.plays.len() + network.friction]].concat();
     let golden: Vec<Vec<f32>> = card.golden.iter().map(seen).collect();
     let choice = network::choose(&network, &golden, source.weights_deviation / 1000.0, source.weights).map_err(|cause| {
         ModelError::Weights { path: path.clone(), unit: source.quantity.unit(), key: source.quantity.deviation_key(), cause }

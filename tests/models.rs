@@ -442,6 +442,26 @@ fn what_a_card_says_about_load_is_read_whole_or_refused() {
     ] {
         assert_refused(&directory, watching(), key, value, problem);
     }
+    let with_friction =
+        |least: &str, largest: &str| watching().set("ravenpose.friction_min_nm", least).set("ravenpose.friction_max_nm", largest);
+    for (model, key, problem) in [
+        (with_friction("-1 -1 -1", "1 1 1"), "friction_min_nm", ": 3 numbers, the network takes the friction of 0 motors"),
+        (with_friction("-1 0 -1", "1 1 1"), "friction_min_nm", ": 0 to 1 does not hold the usual friction, 0"),
+        (with_friction("-1 -1 -1", "1 -0.5 1"), "friction_min_nm", ": -1 to -0.5 does not hold the usual friction, 0"),
+        (with_friction("-1 -1", "1 1 1"), "friction_min_nm", ": 2 numbers, expected 3"),
+        (
+            watching().set("ravenpose.friction_min_nm", "-1 -1 -1"),
+            "friction_max_nm",
+            " is missing; a trained model states it, see docs/models.md",
+        ),
+        (
+            small().trained().set("ravenpose.friction_max_nm", "1 1 1"),
+            "load_expected",
+            " is missing; a trained model states it, see docs/models.md",
+        ),
+    ] {
+        assert_eq!(refusal(&directory, &model.bytes()), format!("property ravenpose.{key}{problem}"));
+    }
 }
 
 #[test]

@@ -51,6 +51,7 @@ fn remembering() -> ArmModel<Estimate> {
         travel_deg: [2e4; load::MOTORS],
         information: [1e-3; load::MOTORS],
         limit_kg: 1e6,
+        friction: None,
     };
     loaded.model.allowed.runlevels = vec![3];
     loaded.model.estimator = Estimate::new(&network, Plan::new(&network)).watching(Some(load));

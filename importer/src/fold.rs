@@ -200,7 +200,7 @@ impl Folder {
         let output_width = self.layers.last().map_or(0, |l| l.matrix.outputs);
         let bias_terms = self.layers.iter().map(|l| l.terms.clone()).collect();
         let layers = self.layers.into_iter().map(Layer::narrow).collect::<Result<_, _>>()?;
-        let network = Network { input_width, output_width, plays: Vec::new(), input_scale, layers, metadata };
+        let network = Network { input_width, output_width, plays: Vec::new(), friction: 0, input_scale, layers, metadata };
         Ok(Folded { network, cancelling, bias_terms })
     }
 }

@@ -55,14 +55,14 @@ pub struct Expected {
 pub fn import(bytes: &[u8], expected: &Expected) -> Result<Network, ImportError> {
     let mut checked = check::check(bytes, expected)?;
     let metadata = std::mem::take(&mut checked.metadata);
-    let plays = std::mem::take(&mut checked.plays);
+    let memory::Cut { plays, friction } = std::mem::take(&mut checked.memory);
     let norms_input = !checked.input_norms.is_empty();
     let expected = checked.expected;
     guard::guarded(|| {
         let mut oracle = Oracle::load(&checked.proto, expected.inputs)?;
         let links = chain::read(&tract::declutter(checked, expected.inputs)?, &expected)?;
         let mut folded = fold::fold(links, expected.inputs, metadata)?;
-        folded.network.plays = plays;
+        (folded.network.plays, folded.network.friction) = (plays, friction);
         if norms_input {
             // tract's runner writes the normalisation as `a * x + b`, though the imported network does not.
             folded.cancelling.fill(true);

@@ -17,6 +17,8 @@ pub(crate) const DEPTH_MAX: usize = 16;
 pub(crate) const SHAPE_NUMBERS_MAX: usize = RANK_MAX;
 /// Plays of a memory.
 pub(crate) const PLAYS_MAX: usize = 64;
+/// Numbers of friction beside it: one per motor would be eight.
+pub(crate) const FRICTION_MAX: i64 = 8;
 /// Operator sets. tract states that it is tested with 9 to 18 and reads later ones by the same rules; the tests here read the
 /// operators of dense networks in each version up to 22, and none beyond.
 pub(crate) const OPSETS: std::ops::RangeInclusive<i64> = 9..=22;

@@ -10,6 +10,8 @@
 //! memory.inputs  = Concat(input, x - memory_out)       what the first layer sees
 //! ```
 //!
+//! A network that knows of friction has one more such input, `friction` [1, m], zeros by default: the last of what is concatenated.
+//!
 //! Here that part is checked against this very form and cut off; the rest is a chain like any other.
 
 use tract_onnx::pb::attribute_proto::AttributeType;
@@ -18,12 +20,13 @@ use tract_onnx::pb::tensor_shape_proto::dimension::Value as Dim;
 use tract_onnx::pb::{AttributeProto, GraphProto, NodeProto, TensorProto, ValueInfoProto, type_proto};
 
 use crate::error::ImportError;
-use crate::limits::PLAYS_MAX;
+use crate::limits::{FRICTION_MAX, PLAYS_MAX};
 use crate::network::Play;
 
 const MEMORY: &str = "memory";
 const REMEMBERED: &str = "remembered";
 const OUT: &str = "memory_out";
+const FRICTION: &str = "friction";
 const FEATURES: &str = "memory.features";
 const HALF_WIDTHS: &str = "memory.half_widths";
 const INPUTS: &str = "memory.inputs";
@@ -40,31 +43,50 @@ const NODES: [(&str, &[&str], &str); 8] = [
     ("Concat", &["@", "memory.places"], INPUTS),
 ];
 
-/// Takes the memory off the graph, whose input is then as wide as the first layer; no plays where the file has no memory.
+/// What was taken off a graph.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Cut {
+    pub(crate) plays: Vec<Play>,
+    /// Numbers of friction behind their places.
+    pub(crate) friction: usize,
+}
+
+impl Cut {
+    /// Inputs of the first layer beyond the file's own.
+    pub(crate) fn width(&self) -> usize {
+        self.plays.len() + self.friction
+    }
+}
+
+/// Takes the memory off the graph, whose input is then as wide as the first layer; nothing where the file has no memory.
 ///
 /// # Errors
 /// [`ImportError::Memory`] for one of another form.
-pub(crate) fn cut(graph: &mut GraphProto, inputs: usize) -> Result<Vec<Play>, ImportError> {
+pub(crate) fn cut(graph: &mut GraphProto, inputs: usize) -> Result<Cut, ImportError> {
     let named = |list: &[ValueInfoProto], name: &str| list.iter().any(|one| one.name == name);
     if !named(&graph.input, MEMORY) && !named(&graph.output, OUT) {
-        return Ok(Vec::new());
+        return Ok(Cut::default());
     }
     let own = own_input(graph)?;
     if let Some(absent) = [MEMORY, REMEMBERED].iter().find(|name| !named(&graph.input, name)) {
         return Err(wrong(format!("{absent} is no input of the graph")));
     }
-    check_nodes(graph, &own)?;
+    let friction = friction(graph)?;
+    check_nodes(graph, &own, friction > 0)?;
     check_names(graph, &own)?;
-    let plays = plays(graph, inputs)?;
-    check_ports(graph, plays.len())?;
-    check_default(graph, MEMORY, DataType::Float, plays.len())?;
+    let cut = Cut { plays: plays(graph, inputs)?, friction };
+    check_ports(graph, &cut)?;
+    check_default(graph, MEMORY, DataType::Float, cut.plays.len())?;
     check_default(graph, REMEMBERED, DataType::Bool, 1)?;
+    if friction > 0 {
+        check_default(graph, FRICTION, DataType::Float, friction)?;
+    }
     graph.node.drain(..NODES.len());
-    graph.initializer.retain(|one| ![MEMORY, REMEMBERED, FEATURES, HALF_WIDTHS].contains(&one.name.as_str()));
-    graph.input.retain(|one| one.name != MEMORY && one.name != REMEMBERED);
+    graph.initializer.retain(|one| ![MEMORY, REMEMBERED, FRICTION, FEATURES, HALF_WIDTHS].contains(&one.name.as_str()));
+    graph.input.retain(|one| ![MEMORY, REMEMBERED, FRICTION].contains(&one.name.as_str()));
     graph.output.retain(|one| one.name != OUT);
-    let widened = graph.input.iter_mut().find(|one| one.name == own).is_some_and(|one| widen(one, inputs, plays.len()));
-    if widened { Ok(plays) } else { Err(wrong(format!("the graph's input is not [1, {inputs}]"))) }
+    let widened = graph.input.iter_mut().find(|one| one.name == own).is_some_and(|one| widen(one, inputs, cut.width()));
+    if widened { Ok(cut) } else { Err(wrong(format!("the graph's input is not [1, {inputs}]"))) }
 }
 
 fn wrong(found: String) -> ImportError {
@@ -74,18 +96,30 @@ fn wrong(found: String) -> ImportError {
 /// The one input that is neither stored nor the memory's.
 fn own_input(graph: &GraphProto) -> Result<String, ImportError> {
     let stored = |name: &str| graph.initializer.iter().any(|one| one.name == name);
-    let mut own =
-        graph.input.iter().map(|one| one.name.as_str()).filter(|name| !stored(name) && ![MEMORY, REMEMBERED].contains(name));
+    let of_memory = |name: &str| [MEMORY, REMEMBERED, FRICTION].contains(&name);
+    let mut own = graph.input.iter().map(|one| one.name.as_str()).filter(|name| !stored(name) && !of_memory(name));
     match (own.next(), own.next()) {
         (Some(name), None) => Ok(name.to_owned()),
         _ => Err(wrong("not exactly one input beside the memory's".to_owned())),
     }
 }
 
-fn check_nodes(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
+/// Numbers of friction that the graph takes; 0 where it has no such input.
+fn friction(graph: &GraphProto) -> Result<usize, ImportError> {
+    if !graph.input.iter().any(|one| one.name == FRICTION) {
+        return Ok(0);
+    }
+    match stored(graph, FRICTION)?.dims.as_slice() {
+        [1, width @ 1..=FRICTION_MAX] => Ok(*width as usize),
+        _ => Err(wrong(format!("{FRICTION} is not [1, 1 to {FRICTION_MAX}]"))),
+    }
+}
+
+fn check_nodes(graph: &GraphProto, own: &str, has_friction: bool) -> Result<(), ImportError> {
     for (index, (operator, inputs, output)) in NODES.iter().enumerate() {
         let node = graph.node.get(index).ok_or_else(|| wrong(format!("only {index} nodes")))?;
-        let wanted = inputs.iter().map(|name| if *name == "@" { own } else { *name });
+        let last = (*output == INPUTS && has_friction).then_some(FRICTION);
+        let wanted = inputs.iter().map(|name| if *name == "@" { own } else { *name }).chain(last);
         let same = node.op_type == *operator
             && node.domain.is_empty()
             && node.input.iter().map(String::as_str).eq(wanted)
@@ -119,8 +153,14 @@ fn check_names(graph: &GraphProto, own: &str) -> Result<(), ImportError> {
 }
 
 /// The memory's own inputs and output, as they are declared.
-fn check_ports(graph: &GraphProto, plays: usize) -> Result<(), ImportError> {
-    let wanted = [(MEMORY, DataType::Float, plays), (REMEMBERED, DataType::Bool, 1), (OUT, DataType::Float, plays)];
+fn check_ports(graph: &GraphProto, cut: &Cut) -> Result<(), ImportError> {
+    let plays = cut.plays.len();
+    let wanted = [
+        (MEMORY, DataType::Float, plays),
+        (REMEMBERED, DataType::Bool, 1),
+        (OUT, DataType::Float, plays),
+        (FRICTION, DataType::Float, cut.friction),
+    ];
     for port in graph.input.iter().chain(&graph.output) {
         let Some((name, data_type, width)) = wanted.iter().find(|(name, ..)| port.name == *name) else { continue };
         let Some(type_proto::Value::TensorType(tensor)) = port.r#type.as_ref().and_then(|kind| kind.value.as_ref()) else {
@@ -195,13 +235,13 @@ fn numbers<T, const BYTES: usize>(
 }
 
 /// Gives the graph's input the name and the width of what the first layer sees; `false` if it was not `inputs` wide.
-fn widen(input: &mut ValueInfoProto, inputs: usize, plays: usize) -> bool {
+fn widen(input: &mut ValueInfoProto, inputs: usize, more: usize) -> bool {
     let Some(type_proto::Value::TensorType(tensor)) = input.r#type.as_mut().and_then(|kind| kind.value.as_mut()) else {
         return false;
     };
     let Some(width) = tensor.shape.as_mut().and_then(|shape| shape.dim.get_mut(1)) else { return false };
     match &mut width.value {
-        Some(Dim::DimValue(value)) if *value == inputs as i64 => *value = (inputs + plays) as i64,
+        Some(Dim::DimValue(value)) if *value == inputs as i64 => *value = (inputs + more) as i64,
         _ => return false,
     }
     INPUTS.clone_into(&mut input.name);

@@ -85,12 +85,14 @@ pub struct Dense {
 /// A network of dense layers, each taking the previous one's outputs. Units of input and output are the caller's business.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
-    /// Numbers that [`Network::evaluate_f64`] takes: the file's inputs, and behind them one place x - y per play.
+    /// Numbers that [`Network::evaluate_f64`] takes: the file's inputs, behind them one place x - y per play, and the friction.
     pub input_width: usize,
     /// Numbers that it gives.
     pub output_width: usize,
     /// The memory in front of the first layer; empty where the file has none.
     pub plays: Vec<Play>,
+    /// How many numbers of friction stand behind the places; whoever runs the network has to know them, 0 is what is usual.
+    pub friction: usize,
     /// Step before the first layer, absent when it would change nothing.
     pub input_scale: Option<InputScale>,
     /// At least one layer.
@@ -155,6 +157,7 @@ impl Network {
             input_width: widths.first().copied().unwrap_or(0),
             output_width: widths.last().copied().unwrap_or(0),
             plays: Vec::new(),
+            friction: 0,
             input_scale: None,
             layers,
             metadata: BTreeMap::new(),

@@ -362,6 +362,46 @@ fn a_memory_of_another_form_is_refused_whatever_is_different() {
     }
 }
 
+/// Five raw inputs, two plays and three numbers of friction in front of a network of ten inputs.
+fn told_friction() -> ModelProto {
+    let bare = Chain::new(10).with("Sub", &[0.5; 10]).dense(6).activate("Tanh").dense(3).finish();
+    common::tell_friction(common::remember(bare, 5, &PLAYS), 3)
+}
+
+#[test]
+fn friction_is_what_stands_behind_the_memory_and_of_no_other_form() {
+    type Change = fn(&mut tract_onnx::pb::GraphProto);
+    let network = import_remembering(&told_friction()).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((network.plays.len(), network.friction, network.input_width), (2, 3, 10));
+    let bare = Chain::new(10).with("Sub", &[0.5; 10]).dense(6).activate("Tanh").dense(3).finish();
+    let bare = import(&bytes(&bare), &Expected { inputs: 10, outputs: 3 }).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((&network.layers, &network.input_scale, bare.friction), (&bare.layers, &bare.input_scale, 0));
+    let changes: [(&str, Change); 7] = [
+        ("node 7 is not the Concat", |graph| drop(graph.node[7].input.pop())),
+        ("node 7 is not the Concat", |graph| graph.node[7].input.swap(1, 2)),
+        ("friction is not stored exactly once", |graph| graph.initializer.retain(|one| one.name != "friction")),
+        ("friction is not [1, 1 to 8]", |graph| graph.initializer.last_mut().unwrap().dims = vec![3]),
+        ("friction is not [1, 1 to 8]", |graph| graph.initializer.last_mut().unwrap().dims = vec![1, i64::MAX]),
+        ("friction does not begin with zeros", |graph| graph.initializer.last_mut().unwrap().raw_data[3] = 0x3f),
+        ("friction is not declared as FLOAT [1, 3]", |graph| {
+            *graph.input.last_mut().unwrap() = port("friction", Some(dimension::Value::DimValue(1)), 4);
+        }),
+    ];
+    for (what, change) in changes {
+        let mut model = told_friction();
+        change(model.graph.as_mut().unwrap());
+        match import_remembering(&model) {
+            Err(ImportError::Memory { found }) => assert!(found.contains(what), "{found} for {what}"),
+            other => panic!("{other:?} for {what}"),
+        }
+    }
+    // Without a memory it is an input too many.
+    let mut model = Chain::new(5).dense(3).finish();
+    let graph = model.graph.as_mut().unwrap();
+    graph.input.push(port("friction", Some(dimension::Value::DimValue(1)), 3));
+    assert!(import_remembering(&model).is_err());
+}
+
 #[test]
 fn a_memory_that_the_layers_do_not_wait_for_is_refused() {
     // The first layer takes the raw features past the memory.

@@ -42,9 +42,15 @@ fn remembering() -> ModelProto {
     )
 }
 
+/// With three numbers of friction behind them.
+fn told_friction() -> ModelProto {
+    let bare = Chain::new(10).with("Sub", &[1.0; 10]).dense(4).norm().activate("Sigmoid").dense(3).finish();
+    common::tell_friction(common::remember(bare, 5, &[(0, 0.5), (3, 2.0)]), 3)
+}
+
 #[test]
 fn every_truncation_is_refused_or_still_whole() {
-    for model in [small(), remembering()] {
+    for model in [small(), remembering(), told_friction()] {
         let whole = bytes(&model);
         let network = import(&whole, &SMALL).unwrap();
         for length in 0..whole.len() {

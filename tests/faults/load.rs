@@ -11,16 +11,21 @@ const TAU: usize = 40;
 /// The most of it that the model has seen.
 const TAU_MAX: f32 = 10.0;
 
-/// Corrects by 1 mm along z, and takes the first torque for the load's score.
-struct Scale(f32);
+/// Corrects by 1 mm along z, and takes the first torque for the load's score, the second, if it is not 0, for the friction's.
+struct Scale(f32, Option<f32>);
 
 impl Estimator for Scale {
     fn weigh(&mut self, features: &[f32; FEATURES], _time_ns: i64) {
         self.0 = features[TAU];
+        self.1 = (features[TAU + 1] != 0.0).then_some(features[TAU + 1]);
     }
 
     fn load_score(&self) -> Option<f32> {
         Some(self.0)
+    }
+
+    fn friction_score(&self) -> Option<f32> {
+        self.1
     }
 
     /// Of no load at all it is never sure.
@@ -37,6 +42,7 @@ struct Bench {
     cycle: Cycle<Scale>,
     pose: CorrectedPose,
     step: u64,
+    friction: f32,
 }
 
 impl Bench {
@@ -45,7 +51,7 @@ impl Bench {
         let mut domain = Domain { min: all(f32::MIN), max: all(f32::MAX), center: all(0.0), weight: all(0.0), limit: 1.0 };
         domain.max[TAU] = TAU_MAX;
         let model = Model {
-            estimator: Scale(0.0),
+            estimator: Scale(0.0, None),
             guard: Guard::new(Some(domain)),
             allowed: Allowed { runlevels: vec![3], boards: Vec::new() },
             id: 1,
@@ -56,7 +62,7 @@ impl Bench {
         };
         let limits = Limits { position: Pace { recover: 1e6, rate: 1e6, envelope: 15_000.0 }, ..Limits::default() };
         let cycle = Cycle::new(limits, [ArmModel::Loaded(Box::new(model)), ArmModel::None], false, 0);
-        Self { cycle, pose: CorrectedPose::new(), step: 0 }
+        Self { cycle, pose: CorrectedPose::new(), step: 0, friction: 0.0 }
     }
 
     /// The last of so many poses with this load, and with the pedal down or up.
@@ -65,7 +71,7 @@ impl Bench {
             self.step += 1;
             let now = (1_000 + self.step as i64) * MS;
             let mut state = state(7, self.step, self.step, now);
-            state.tau[0] = load;
+            (state.tau[0], state.tau[1]) = (load, self.friction);
             state.runlevel = runlevel;
             state.seal(self.step);
             self.cycle.offer(&state, now);
@@ -97,6 +103,22 @@ fn an_unseen_load_is_out_of_domain_at_once_and_the_correction_returns_when_it_is
     let gone = bench.carry(0.5, 100);
     assert_eq!((gone.status, gone.flags), (ArmStatus::Fallback as u32, flag::SETTLING));
     assert_eq!(bench.carry(0.5, 1).correction_um, [0.0, 0.0, 1000.0]);
+}
+
+#[test]
+fn an_unseen_friction_is_out_of_domain_too_and_said_by_its_own_name() {
+    let mut bench = Bench::new();
+    bench.friction = 0.9;
+    let before = bench.carry(0.2, 150);
+    assert_eq!((before.status, before.flags, before.domain_score), (ArmStatus::Valid as u32, 0, 0.9));
+    bench.friction = 1.2;
+    let worn = bench.carry(0.2, 1);
+    let wanted = flag::OUT_OF_DOMAIN | flag::UNSEEN_FRICTION | flag::RESET;
+    assert_eq!((worn.status, worn.flags, worn.domain_score), (ArmStatus::Fallback as u32, wanted, 1.2));
+    assert_eq!((worn.correction_um, worn.corrected_position_um), ([0.0; 3], worn.raw_position_um));
+    let both = bench.carry(1.5, 1);
+    assert_eq!(both.flags, flag::OUT_OF_DOMAIN | flag::UNSEEN_LOAD | flag::UNSEEN_FRICTION);
+    assert_eq!(both.domain_score, 1.5);
 }
 
 #[test]

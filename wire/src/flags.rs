@@ -84,6 +84,8 @@ pub mod flag {
     pub const UNSEEN_LOAD: u32 = 1 << 25;
     /// Information: since the start the motors have not moved far enough to show a load; the bound holds only if there is none.
     pub const LOAD_UNWEIGHED: u32 = 1 << 26;
+    /// Information beside `out_of_domain`: the motors' torques show another friction than the model was trained with.
+    pub const UNSEEN_FRICTION: u32 = 1 << 27;
 }
 
 /// The flags that mean fallback.
@@ -99,7 +101,7 @@ pub struct Flag {
 }
 
 /// Every flag with its name, lowest bit first.
-pub const FLAGS: [Flag; 27] = [
+pub const FLAGS: [Flag; 28] = [
     Flag { bit: flag::INPUT_NOT_FINITE, name: "input_not_finite" },
     Flag { bit: flag::INPUT_STALE, name: "input_stale" },
     Flag { bit: flag::INPUT_IMPOSSIBLE, name: "input_impossible" },
@@ -127,6 +129,7 @@ pub const FLAGS: [Flag; 27] = [
     Flag { bit: flag::MEMORY_UNSETTLED, name: "memory_unsettled" },
     Flag { bit: flag::UNSEEN_LOAD, name: "unseen_load" },
     Flag { bit: flag::LOAD_UNWEIGHED, name: "load_unweighed" },
+    Flag { bit: flag::UNSEEN_FRICTION, name: "unseen_friction" },
 ];
 
 /// The names of the bits that are set, lowest first.

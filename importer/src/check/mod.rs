@@ -12,16 +12,15 @@ use prost::Message;
 use tract_onnx::pb::{GraphProto, ModelProto};
 
 use crate::error::ImportError;
-use crate::network::Play;
 use crate::{Expected, limits, memory, text, wire};
 
 /// A model that holds only known operators, complete finite tensors and one float32 input and output of the expected widths.
 pub(crate) struct Checked {
     pub(crate) proto: ModelProto,
     pub(crate) metadata: BTreeMap<String, String>,
-    /// Of the memory that stood in front of what `proto` still has.
-    pub(crate) plays: Vec<Play>,
-    /// Widths of what `proto` still has: a memory's places are inputs.
+    /// The memory that stood in front of what `proto` still has.
+    pub(crate) memory: memory::Cut,
+    /// Widths of what `proto` still has: a memory's places and the friction are inputs.
     pub(crate) expected: Expected,
     /// Indices of batch normalisations that take the network's own input.
     pub(crate) input_norms: Vec<usize>,
@@ -34,11 +33,11 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Import
     let metadata = metadata(&proto)?;
     let graph = proto.graph.as_mut().ok_or(ImportError::NoGraph)?;
     counts(graph)?;
-    let plays = memory::cut(graph, expected.inputs)?;
-    let expected = Expected { inputs: expected.inputs + plays.len(), ..*expected };
+    let memory = memory::cut(graph, expected.inputs)?;
+    let expected = Expected { inputs: expected.inputs + memory.width(), ..*expected };
     let input = signature::check(graph, &expected)?;
     let input_norms = nodes::check(graph, input)?;
-    Ok(Checked { proto, metadata, plays, expected, input_norms })
+    Ok(Checked { proto, metadata, memory, expected, input_norms })
 }
 
 fn decode(bytes: &[u8]) -> Result<ModelProto, ImportError> {

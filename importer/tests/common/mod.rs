@@ -250,6 +250,15 @@ pub(crate) fn remember(mut model: ModelProto, inputs: usize, plays: &[(i64, f32)
     model
 }
 
+/// Tells a network with a memory so many numbers of friction: it then has so many more inputs than features and plays.
+pub(crate) fn tell_friction(mut model: ModelProto, friction: i64) -> ModelProto {
+    let graph = model.graph.as_mut().unwrap();
+    graph.input.push(port("friction", Some(dimension::Value::DimValue(1)), friction));
+    graph.initializer.push(tensor("friction", &[1, friction], &vec![0.0; friction as usize]));
+    graph.node[7].input.push("friction".to_owned());
+    model
+}
+
 fn floats(tensor: &TensorProto) -> Vec<f64> {
     tensor.raw_data.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }

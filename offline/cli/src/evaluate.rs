@@ -100,6 +100,7 @@ fn words(report: &Report) -> String {
         lines.push(format!("by run {words}"));
     }
     lines.extend(trust.load.iter().map(ToString::to_string));
+    lines.extend(trust.friction.iter().map(ToString::to_string));
     lines.extend(trust.far_off.iter().map(ToString::to_string));
     let in_time: Vec<_> = report.breakdown.iter().filter(|cell| cell.by == BY_TIME).collect();
     if in_time.len() > 1 {

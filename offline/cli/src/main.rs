@@ -204,6 +204,9 @@ enum Command {
         /// Longest run; each run homes the robot anew
         #[arg(long, default_value_t = 5.0)]
         run_minutes: f64,
+        /// So many runs follow each other at once, each as warm as the last ended; every run begins cold unless told otherwise
+        #[arg(long, conflicts_with = "commands")]
+        runs_per_session: Option<usize>,
         /// Threads; the files do not depend on it
         #[arg(long)]
         threads: Option<usize>,
@@ -272,21 +275,33 @@ fn main() -> ExitCode {
         }
         Command::Prove { matrix, seed, out, jobs } => prove::run(&prove::Wish { matrix: &matrix, seed, out: &out, jobs }),
         Command::Record { out, seconds, webcams } => record::run(&out, seconds, &webcams),
-        Command::Simulate { minutes, seed, homing_seed, out, robot, commands, arm, motion, format, run_minutes, threads } => {
-            simulate::run(&simulate::Wish {
-                minutes,
-                seed,
-                homing_seed,
-                out: &out,
-                robot: robot.as_deref(),
-                commands: &commands,
-                arm: &arm,
-                motion: &motion,
-                format: format.as_deref(),
-                run_minutes,
-                threads,
-            })
-        }
+        Command::Simulate {
+            minutes,
+            seed,
+            homing_seed,
+            out,
+            robot,
+            commands,
+            arm,
+            motion,
+            format,
+            run_minutes,
+            runs_per_session,
+            threads,
+        } => simulate::run(&simulate::Wish {
+            minutes,
+            seed,
+            homing_seed,
+            out: &out,
+            robot: robot.as_deref(),
+            commands: &commands,
+            arm: &arm,
+            motion: &motion,
+            format: format.as_deref(),
+            run_minutes,
+            runs_per_session,
+            threads,
+        }),
         Command::Stats { watch, hgrm, runtime_dir } => stats::run(&runtime_dir, watch, hgrm.as_deref()),
         Command::Train(wish) => train::run(&wish),
         Command::Search(wish) => search::run(&wish),

@@ -81,6 +81,7 @@ impl Source {
             truth_noise: self.truth_noise,
             seed: recipe.seed,
             plays: recipe.plays(),
+            friction: recipe.friction,
             arm: self.arm,
             target: Quantity::of_name(&self.target).unwrap_or_default(),
             columns: self.columns.columns(),

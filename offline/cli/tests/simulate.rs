@@ -130,6 +130,41 @@ fn a_raven_follows_commands_as_states() {
 }
 
 #[test]
+fn runs_of_a_session_follow_each_other_whatever_the_threads() {
+    let folder = Folder::new("session");
+    let made = |name: &str, more: &[&str]| {
+        let out = folder.file(name);
+        let plan = [
+            "simulate",
+            "--minutes",
+            "0.08",
+            "--run-minutes",
+            "0.02",
+            "--seed",
+            "5",
+            "--robot",
+            "raven2-worn",
+            "--format",
+            "csv",
+            "--out",
+            text(&out),
+        ];
+        done(&[&plan[..], more].concat());
+        let read = |file: &str| std::fs::read(out.join(file)).expect(file);
+        [read("run_0001.csv"), read("run_0002.csv"), read("run_0003.csv"), read("run_0004.csv"), read("simulation.txt")]
+    };
+    let cold = made("cold", &[]);
+    let one = made("one", &["--runs-per-session", "2", "--homing-seed", "3", "--threads", "1"]);
+    let two = made("two", &["--runs-per-session", "2", "--homing-seed", "3", "--threads", "2"]);
+    assert!(one == two, "files depend on the threads");
+    assert!(String::from_utf8_lossy(&one[4]).contains("runs per session = 2"));
+    let homed = made("homed", &["--homing-seed", "3"]);
+    // The first and the third run begin a session, the others go on where it stands.
+    assert_eq!([0, 1, 2, 3].map(|run| one[run] == homed[run]), [true, false, true, false]);
+    assert!(cold[0] != homed[0]);
+}
+
+#[test]
 fn what_is_for_another_robot_is_refused() {
     let folder = Bench::new("refused");
     let plan = ["--minutes", "0.01", "--seed", "1"];
@@ -137,6 +172,8 @@ fn what_is_for_another_robot_is_refused() {
     folder.refuses("arm.urdf", &with(&["--format", "mcap"]), "RAVEN-II only");
     folder.refuses("arm.urdf", &with(&["--arm", "green"]), "has one arm");
     folder.refuses("arm.urdf", &with(&["--motion", "zigzag"]), "is for RAVEN-II");
+    folder.refuses("arm.urdf", &with(&["--runs-per-session", "2"]), "is no RAVEN-II, whose runs alone make sessions");
+    folder.refuses("arm.urdf", &with(&["--runs-per-session", "0"]), "--runs-per-session 0: a session has at least one run");
     folder.refuses("none.urdf", &plan, "none.urdf: cannot be read");
     folder.0.write("bad.urdf", ARM.replace("upper=\"1\"", "upper=\"one\""));
     folder.refuses("bad.urdf", &plan, "bad.urdf: URDF line 8, joint swing");

@@ -8,7 +8,8 @@ use simulator::production::{Motion, Plan, Player};
 fn main() {
     for (name, robot) in [("raven2-nominal", Robot::nominal()), ("raven2-worn", Robot::worn())] {
         let (duration_s, run_s, motion) = (20.0 * 60.0, 60.0, Motion::Mixed);
-        let plan = Plan { robot, sides: vec![Side::Gold], duration_s, run_s, seed: 1, homing_seed: None, motion };
+        let plan =
+            Plan { robot, sides: vec![Side::Gold], duration_s, run_s, runs_per_session: 1, seed: 1, homing_seed: None, motion };
         let (mut squares, mut largest, mut count) = (0.0, 0.0_f64, 0_u64);
         let mut means = Vec::new();
         let mut within = 0.0;

@@ -1,5 +1,5 @@
-//! Whole runs: homing, a trajectory, full states at 1 kHz with their truth. Every run depends on its own number and seed only,
-//! so any number of threads makes the same files.
+//! Whole runs: homing, a trajectory, full states at 1 kHz with their truth. Every run depends on its own number and seed only, or on
+//! the runs before it in its session too, so any number of threads makes the same files.
 
 use arm::{Arm, Joints, Side};
 use ravenpose_wire::RavenState;
@@ -13,7 +13,7 @@ use crate::resimulate::{self, Commands, ResimulateError};
 use crate::simulation::{Command, CycleOfArm, Simulation};
 use crate::trajectory::{Trajectory, WORKSPACE, teleoperation, zigzag};
 
-/// Wall clock of the first sample of the first run, s since 1970; runs follow each other an hour apart.
+/// Wall clock of the first sample of the first run, s since 1970; sessions begin as many hours apart as they have runs.
 const EPOCH_S: i64 = 1_700_000_000;
 /// How long cables settle before the first sample, s.
 const SETTLE_S: f64 = 2.0;
@@ -40,6 +40,8 @@ pub struct Plan {
     pub duration_s: f64,
     /// Longest run, s.
     pub run_s: f64,
+    /// So many runs follow each other at once, each as warm as the last ended; at least 1, a cold start each.
+    pub runs_per_session: usize,
     /// Everything follows from it.
     pub seed: u64,
     /// What homing leaves follows from this one instead, the same in every run: the robot stays homed between the runs.
@@ -61,6 +63,8 @@ pub struct Run {
     pub duration_s: f64,
     /// Is it a zig-zag?
     pub zigzag: bool,
+    /// Its place in its session, from 0: a cold start.
+    pub in_session: usize,
 }
 
 impl Plan {
@@ -77,7 +81,8 @@ impl Plan {
                     Motion::Mixed => index % 4 == 3,
                 };
                 let homing_seed = self.homing_seed.unwrap_or(seed);
-                Run { index, seed, homing_seed, duration_s: self.duration_s / count as f64, zigzag }
+                let in_session = index % self.runs_per_session.max(1);
+                Run { index, seed, homing_seed, duration_s: self.duration_s / count as f64, zigzag, in_session }
             })
             .collect()
     }
@@ -130,6 +135,19 @@ impl Player {
     pub fn new(plan: &Plan, run: Run) -> Result<Self, PlantError> {
         let arms = plan.sides.iter().map(|side| playing(&plan.robot, *side, run)).collect::<Result<_, _>>()?;
         Ok(Self { run, arms, cycle: 0 })
+    }
+
+    /// The run after this one, in the same session: the arm put elsewhere, with what cables and motors remember.
+    ///
+    /// # Errors
+    /// As [`Player::new`].
+    pub fn followed_by(&self, plan: &Plan, run: Run) -> Result<Self, PlantError> {
+        let mut next = Self::new(plan, run)?;
+        for (next, last) in next.arms.iter_mut().zip(&self.arms) {
+            next.simulation.go_on_from(&last.simulation);
+            next.simulation.settle(&next.way.at(0.0), SETTLE_S);
+        }
+        Ok(next)
     }
 
     /// One arm along the commands of a recording: from the recorded motors and their speeds, or, where it has none, settled at
@@ -197,7 +215,8 @@ impl Player {
     }
 
     fn start_ns(&self) -> i64 {
-        (EPOCH_S + 3600 * self.run.index as i64) * 1_000_000_000
+        let session = (self.run.index - self.run.in_session) as i64;
+        (EPOCH_S + 3600 * session + self.run.in_session as i64 * self.run.duration_s.ceil() as i64) * 1_000_000_000
     }
 }
 
@@ -223,5 +242,41 @@ fn truth(time_ns: i64, side: Side, cycle: &CycleOfArm) -> Truth {
         quaternion_wxyz: [q.w, q.i, q.j, q.k],
         joints: cycle.truth.joints,
         cable_force_n: cycle.truth.cable_force_n,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_of_a_session_begins_as_warm_as_the_last_ended() {
+        let robot = RobotModel::load("raven2-worn").ok().and_then(|model| model.as_raven().cloned()).expect("worn robot");
+        let plan = Plan {
+            robot,
+            sides: vec![Side::Gold],
+            duration_s: 9.0,
+            run_s: 3.0,
+            runs_per_session: 2,
+            seed: 3,
+            homing_seed: Some(1),
+            motion: Motion::Teleoperation,
+        };
+        let runs = plan.runs();
+        assert_eq!(runs.iter().map(|run| run.in_session).collect::<Vec<_>>(), [0, 1, 0]);
+        let mut first = Player::new(&plan, runs[0]).expect("a run");
+        while first.next_cycle().is_some() {}
+        let warmth = |player: &mut Player| {
+            let simulation = &mut player.arms[0].simulation;
+            let slot = simulation.plant().drive_mut(2).thermal[0].1;
+            simulation.state().memories[slot]
+        };
+        let (mut cold, mut warm) = (Player::new(&plan, runs[1]).expect("a run"), first.followed_by(&plan, runs[1]).expect("a run"));
+        let [end, cold, begun] = [&mut first, &mut cold, &mut warm].map(warmth);
+        // Two seconds of holding still, with a time constant of 15 minutes.
+        assert!(end > 1e-4 && cold < 0.8 * end && (begun / end - 1.0).abs() < 0.2, "{end} {cold} {begun}");
+        // One after the other by the clock too.
+        assert_eq!(warm.start_ns() - first.start_ns(), 3_000_000_000);
+        assert_eq!(Player::new(&plan, runs[2]).expect("a run").start_ns() - first.start_ns(), 2 * 3_600_000_000_000);
     }
 }

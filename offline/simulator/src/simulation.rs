@@ -125,6 +125,12 @@ impl Simulation {
         self.state.rates[..FIRST].copy_from_slice(&self.arm.transmission.joints(&all)[..FIRST]);
     }
 
+    /// Takes over what the cables and motors of the same robot remember: hysteresis, creep, warmth.
+    pub fn go_on_from(&mut self, last: &Self) {
+        self.state.memories = last.state.memories;
+        self.tool.go_on_from(&last.tool);
+    }
+
     /// Another state of joints 1 to 3 and their motors.
     pub fn set_state(&mut self, state: State) {
         self.state = state;

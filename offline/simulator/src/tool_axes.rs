@@ -48,6 +48,11 @@ impl ToolAxes {
         }
     }
 
+    /// Takes over how warm the same drives were.
+    pub(crate) fn go_on_from(&mut self, last: &Self) {
+        self.warmth.clone_from(&last.warmth);
+    }
+
     /// Switches effects on and off.
     pub(crate) fn at(&mut self, time_s: f64) {
         self.drives.iter_mut().for_each(|drive| {

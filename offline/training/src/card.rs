@@ -3,6 +3,7 @@
 use crate::chain::Chain;
 use crate::data::Trajectory;
 use crate::data::memory::AGES_S;
+use crate::load;
 use crate::prepare::Prepared;
 use ravenpose::correction::Quantity;
 use ravenpose::load::LoadCard;
@@ -148,6 +149,11 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
             put("ravenpose.load_information", words(&load.information));
             put("ravenpose.load_limit_kg", load.limit_kg.to_string());
         }
+        if let (true, Some(load)) = (facts.chain.friction, facts.load) {
+            let known = load::friction_known(load, facts.chain.plays.len(), facts.train.iter().chain(facts.validation));
+            put("ravenpose.friction_min_nm", words(&known.map(|(least, _)| least)));
+            put("ravenpose.friction_max_nm", words(&known.map(|(_, largest)| largest)));
+        }
         put(keys.bound, format!("{:.2}", BOUND_ROOM * largest.fold(0.0, f64::max)));
     }
     let (low, high) = ranges(facts, is_raven);
@@ -246,7 +252,7 @@ mod tests {
 
     fn chain_of_nothing(outputs: usize) -> Chain {
         let layer = Dense { weight: Array2::zeros((outputs, 1)), bias: vec![0.0; outputs], activation: Activation::Identity };
-        Chain { shift: vec![0.0], scale: vec![1.0], layers: vec![layer], plays: Vec::new() }
+        Chain { shift: vec![0.0], scale: vec![1.0], layers: vec![layer], plays: Vec::new(), friction: false }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::network::Activation;
 use crate::train::Trained;
 use ndarray::{Array1, Array2, ArrayView2, linalg::general_mat_mul};
+use ravenpose::load::MOTORS;
 use ravenpose::memory::Play;
 
 /// Rows that are evaluated at a time.
@@ -28,13 +29,15 @@ pub struct Chain {
     pub scale: Vec<f32>,
     /// At least one.
     pub layers: Vec<Dense>,
-    /// The memory in front, whose places are the last inputs.
+    /// The memory in front, whose places are the last inputs but for the friction.
     pub plays: Vec<Play>,
+    /// Is the friction of motors 1 to 3 behind them?
+    pub friction: bool,
 }
 
 impl Chain {
     /// Folds normalisation, preparation, batch normalisation and the labels' unit into the layers, in double precision.
-    pub fn of(trained: &Trained, plays: &[Play]) -> Self {
+    pub fn of(trained: &Trained, plays: &[Play], friction: bool) -> Self {
         let prepared = &trained.prepared;
         let inputs = prepared.mean.len();
         let (mut before_weight, mut before_bias) = prepared.fold();
@@ -71,10 +74,21 @@ impl Chain {
             scale: (0..inputs).map(|input| prepared.scale(input) as f32).collect(),
             layers,
             plays: plays.to_vec(),
+            friction,
         }
     }
 
-    /// Width of the input row, a memory's places included.
+    /// Inputs beyond the recording's own: places of plays, and friction.
+    pub fn remembered(&self) -> usize {
+        self.plays.len() + self.frictions()
+    }
+
+    /// Inputs of friction.
+    pub fn frictions(&self) -> usize {
+        if self.friction { MOTORS } else { 0 }
+    }
+
+    /// Width of the input row, all that is remembered included.
     pub fn inputs(&self) -> usize {
         self.shift.len()
     }
@@ -177,7 +191,7 @@ mod tests {
                     seconds: 0.0,
                     has_line: false,
                 };
-                let chain = Chain::of(&trained, &[]);
+                let chain = Chain::of(&trained, &[], false);
                 for (a, b) in trained.estimate(&one.inputs).iter().zip(chain.estimate(&one.inputs)) {
                     assert!((a - b).abs() < 2e-4 * a.abs().max(1.0), "{place:?} {activation:?}: {a} {b}");
                 }

@@ -10,6 +10,7 @@ use crate::train::{self, Progress};
 use crate::{figures, load, onnx};
 use arm::Raven2;
 use ravenpose::correction::Quantity;
+use ravenpose::load::LoadCard;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -71,7 +72,7 @@ pub struct Done {
 /// [`TrainingError`]: data, checkpoint, or files that cannot be written.
 pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, TrainingError> {
     check_out(wish.out)?;
-    let (mut set, mut parts) =
+    let (mut set, mut parts, load) =
         read_parts(wish.data, wish.reading, wish.recipe.seed, &mut |done, all| told(&Event::Read(done, all)))?;
     let count = |part: &[Trajectory]| part.iter().map(Trajectory::rows).sum();
     let rows = [count(&parts.train), count(&parts.validation), parts.test.rows()];
@@ -80,17 +81,9 @@ pub fn train(wish: &Wish, told: &mut dyn FnMut(&Event)) -> Result<Done, Training
     let checkpoint = beside(wish.out, "checkpoint");
     let mut progress = |progress: &Progress| told(&Event::Epoch(*progress));
     let trained = train::train(&parts, set.outputs(), wish.recipe, Some(&checkpoint), &mut progress)?;
-    let chain = Chain::of(&trained, &wish.reading.plays);
+    let chain = Chain::of(&trained, &wish.reading.plays, wish.reading.tells_friction() && load.is_some());
     let (epoch, validation_rms) = train::best(&trained.curves).map_or((0, f64::NAN), |best| (best.epoch, best.validation_rms));
-    let mut notes = std::mem::take(&mut set.notes);
-    let load = if set.is_raven {
-        let arm = Raven2::nominal().arm(wish.reading.arm);
-        load::fit(&arm, chain.plays.len(), &parts.train, &parts.validation)
-            .map_err(|why| notes.push(format!("the model does not watch the load: {why}")))
-            .ok()
-    } else {
-        None
-    };
+    let notes = std::mem::take(&mut set.notes);
     let facts = Facts {
         chain: &chain,
         is_raven: set.is_raven,
@@ -134,7 +127,8 @@ fn check_out(out: &Path) -> Result<(), TrainingError> {
     Err(TrainingError::file(out, what, "choose another --out"))
 }
 
-/// Reads recordings and deals whole trajectories out; what they have in common stays behind.
+/// Reads recordings and deals whole trajectories out; what they have in common stays behind. Of a RAVEN-II's also what watches the load,
+/// fitted to those of training; if the reading wants friction, what it sees of that is appended to all rows but those of the test.
 ///
 /// # Errors
 /// [`TrainingError`]: a recording that cannot be read, the same run twice, too few of them.
@@ -143,12 +137,28 @@ pub(crate) fn read_parts(
     reading: &Reading,
     seed: u64,
     told: &mut dyn FnMut(usize, usize),
-) -> Result<(DataSet, Parts), TrainingError> {
+) -> Result<(DataSet, Parts, Option<LoadCard>), TrainingError> {
     let mut set = data::read(files, reading, told)?;
     refuse_twins(&set)?;
     let split = Split::draw(set.trajectories.len(), seed)?;
-    let parts = Parts::of(&mut set, &split);
-    Ok((set, parts))
+    let mut parts = Parts::of(&mut set, &split);
+    if !set.is_raven {
+        return Ok((set, parts, None));
+    }
+    let (arm, plays) = (Raven2::nominal().arm(reading.arm), reading.plays.len());
+    let load = load::fit(&arm, plays, &parts.train, &parts.validation);
+    match &load {
+        Ok(card) if reading.tells_friction() => {
+            parts.train.iter_mut().chain(&mut parts.validation).for_each(|one| load::append_friction(card, plays, one));
+            set.input_names.extend(load::friction_names());
+        }
+        Ok(_) => {}
+        Err(why) => {
+            let nor = if reading.tells_friction() { ", nor is it told of friction" } else { "" };
+            set.notes.push(format!("the model does not watch the load{nor}: {why}"));
+        }
+    }
+    Ok((set, parts, load.ok()))
 }
 
 /// A run that is given twice, whole or in part, would be in two sets.

@@ -25,6 +25,8 @@ const APART_MAX_S: f64 = load::PAUSE_NS as f64 * 1e-9;
 const BETWEEN_S: f64 = 1.0;
 /// Less motion than this many averages long shows nothing about how far they stray.
 const MOTION_MIN_S: f64 = 5.0 * AVERAGED_S;
+/// The range of friction is widened by this share of itself on both sides.
+const FRICTION_ROOM: f32 = 0.1;
 /// Share of the rows that stay below the limit, and room beyond it.
 const LIMIT_SHARE: f64 = 0.999;
 const LIMIT_ROOM: f64 = 1.1;
@@ -52,6 +54,7 @@ pub fn fit(arm: &Arm, plays: usize, train: &[Trajectory], validation: &[Trajecto
         travel_deg: speed.map(|speed| (AVERAGED_S * speed) as f32),
         information: [1.0; MOTORS],
         limit_kg: 1.0,
+        friction: None,
     };
     // With a pull of 1 and one motor alone the observer averages what is left of that motor's torque.
     let averaged = |motor: usize| {
@@ -78,6 +81,12 @@ pub struct Weighed {
     pub mass_kg: Vec<f64>,
     /// Would the service call it unseen?
     pub unseen: Vec<bool>,
+    /// Friction of motors 1 to 3 beyond the usual, N·m.
+    pub friction_nm: Vec<[f32; MOTORS]>,
+    /// Would the service call that unseen?
+    pub friction_unseen: Vec<bool>,
+    /// Had it moved far enough for either?
+    pub has_weighed: Vec<bool>,
 }
 
 /// Runs one observer through trajectories, one after the other as a service does that runs on; it is shown the rows, counted through all of
@@ -92,16 +101,55 @@ pub fn weigh<'a>(
     let mut found = Weighed::default();
     let mut begun_s = 0.0;
     for one in runs {
-        for (row, time_s) in one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s) {
+        let width = one.inputs.len() / one.rows().max(1);
+        for (row, time_s) in one.inputs.chunks_exact(width.max(1)).zip(&one.time_s) {
             if admitted(found.unseen.len()) {
-                observer.follow(row, ((begun_s + time_s) * 1e9).round() as i64);
+                observer.follow(&row[..FEATURES + plays], ((begun_s + time_s) * 1e9).round() as i64);
             }
             found.mass_kg.push(observer.mass_kg());
             found.unseen.push(observer.score() > 1.0);
+            found.friction_nm.push(observer.friction_nm());
+            found.friction_unseen.push(observer.friction_score().is_some_and(|score| score > 1.0));
+            found.has_weighed.push(observer.has_weighed());
         }
         begun_s += one.time_s.last().unwrap_or(&0.0) + BETWEEN_S;
     }
     found
+}
+
+/// Names of what [`append_friction`] appends.
+pub fn friction_names() -> impl Iterator<Item = String> {
+    (1..=MOTORS).map(|motor| format!("friction_{motor}_nm"))
+}
+
+/// Appends to each row the friction that an observer sees which begins with the trajectory: as a service does that has just started.
+pub fn append_friction(card: &LoadCard, plays: usize, one: &mut Trajectory) {
+    let mut observer = LoadObserver::new(card.clone());
+    let seen = one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s).flat_map(|(row, time_s)| {
+        observer.follow(row, (time_s * 1e9).round() as i64);
+        [row, &observer.friction_nm()].concat()
+    });
+    one.inputs = seen.collect();
+}
+
+/// Least and largest friction of each motor that observers see which begin with each trajectory, once they have weighed, or at all where
+/// none has. With room: a session longer than those of training is warmer, and beside what it knows the network goes on most evenly.
+pub fn friction_known<'a>(card: &LoadCard, plays: usize, runs: impl IntoIterator<Item = &'a Trajectory>) -> [(f32, f32); MOTORS] {
+    let weighed: Vec<Weighed> = runs.into_iter().map(|one| weigh(card, plays, [one], |_| true)).collect();
+    let any = weighed.iter().any(|one| one.has_weighed.contains(&true));
+    let mut known = [(0.0_f32, 0.0_f32); MOTORS];
+    for one in &weighed {
+        for (friction, _) in one.friction_nm.iter().zip(&one.has_weighed).filter(|(_, has_weighed)| !any || **has_weighed) {
+            for ((least, largest), friction) in known.iter_mut().zip(friction) {
+                *least = least.min(*friction);
+                *largest = largest.max(*friction);
+            }
+        }
+    }
+    known.map(|(least, largest)| {
+        let room = FRICTION_ROOM * (largest - least);
+        (least - room, largest + room)
+    })
 }
 
 struct Rows<'a> {

@@ -66,6 +66,9 @@ pub struct Recipe {
     pub first: First,
     /// Does it want the memory of the recent motion?
     pub memory: bool,
+    /// Does it want the motors' friction, averaged over minutes?
+    #[serde(default)]
+    pub friction: bool,
     /// Rows per step.
     pub batch: usize,
     /// Learning rate of Adam.
@@ -86,7 +89,7 @@ pub struct Recipe {
 
 impl Recipe {
     /// Names of the presets, the best first.
-    pub const PRESETS: [&str; 4] = ["default", "one-state", "paper", "paper-code"];
+    pub const PRESETS: [&str; 5] = ["default", "plays", "one-state", "paper", "paper-code"];
 
     /// A preset by its name.
     pub fn preset(name: &str) -> Option<Self> {
@@ -94,7 +97,8 @@ impl Recipe {
             "paper" => Some(Self::paper()),
             "paper-code" => Some(Self::paper_code()),
             "default" => Some(Self::ours()),
-            "one-state" => Some(Self { name: name.to_owned(), memory: false, ..Self::ours() }),
+            "plays" => Some(Self { name: name.to_owned(), friction: false, ..Self::ours() }),
+            "one-state" => Some(Self { name: name.to_owned(), memory: false, friction: false, ..Self::ours() }),
             _ => None,
         }
     }
@@ -110,6 +114,7 @@ impl Recipe {
             preparation: Preparation::Standard,
             first: First::Nothing,
             memory: false,
+            friction: false,
             batch: 1024,
             rate: 1e-3,
             schedule: Schedule::Constant,
@@ -151,6 +156,8 @@ impl Recipe {
             "activation must not be identity: layers of it are one".to_owned()
         } else if self.first != First::Nothing && !First::passes(self.activation, self.norm) {
             "a line first wants activation tanh and norm none".to_owned()
+        } else if self.friction && !self.memory {
+            "friction wants memory: it stands behind the places of that".to_owned()
         } else {
             return Ok(());
         };
@@ -166,13 +173,13 @@ impl Recipe {
     /// thousands of rows instead of hundreds of thousands, which may learn what a line leaves.
     #[must_use]
     pub fn for_tables(self) -> Self {
-        let ours = self.name == "default" || self.name == "one-state";
+        let ours = ["default", "plays", "one-state"].contains(&self.name.as_str());
         let small = if ours {
             Self { hidden: vec![48, 48], first: First::Either, batch: 64, epochs: 80, decay: 0.1, ..self }
         } else {
             self
         };
-        Self { preparation: Preparation::Standard, memory: false, ..small }
+        Self { preparation: Preparation::Standard, memory: false, friction: false, ..small }
     }
 
     /// The best found here: docs/training.md.
@@ -185,6 +192,7 @@ impl Recipe {
             preparation: Preparation::Physical,
             first: First::Nothing,
             memory: true,
+            friction: true,
             batch: 256,
             rate: 2e-3,
             schedule: Schedule::Cosine,

@@ -100,6 +100,7 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
         preparation: [base.preparation, Preparation::Standard][random.below(2)],
         first: if First::passes(activation, norm) { base.first } else { First::Nothing },
         memory: base.memory,
+        friction: base.friction,
         batch: 128 << random.below(4),
         rate,
         schedule: [Schedule::Constant, Schedule::Cosine][random.below(2)],
@@ -117,7 +118,7 @@ pub fn draw(base: &Recipe, index: usize) -> Recipe {
 /// # Errors
 /// [`TrainingError`]: data, a folder that cannot be written or holds another search.
 pub fn search(wish: &Wish, told: &mut dyn FnMut(&Trial, usize)) -> Result<Vec<Trial>, TrainingError> {
-    let (set, mut parts) = read_parts(wish.data, wish.reading, wish.base.seed, &mut |_, _| {})?;
+    let (set, mut parts, _) = read_parts(wish.data, wish.reading, wish.base.seed, &mut |_, _| {})?;
     let outputs = set.outputs();
     for one in parts.train.iter_mut().chain(&mut parts.validation) {
         one.thin(wish.every);

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Folder, runs, small};
+use ndarray::Array2;
 use ravenpose::config::ModelSource;
 use ravenpose::correction::Estimator;
 use ravenpose::load::{self as load_card, LoadCard};
@@ -12,9 +13,12 @@ use ravenpose::network::{Format, Plan};
 use ravenpose_wire::{FEATURES, features};
 use recordings::open::{Opened, open};
 use recordings::stream::Record;
+use std::collections::BTreeMap;
+use training::chain::{Chain, Dense};
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading};
-use training::load;
+use training::network::Activation;
+use training::{load, onnx};
 
 #[test]
 fn the_service_gives_for_a_run_what_training_says_of_it() {
@@ -38,6 +42,7 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
         travel_deg: [2e3; 3],
         information: [1e-3; 3],
         limit_kg: 1e5,
+        friction: None,
     };
     let network = ravenpose::model::network(&source.path).expect("network");
     let mut estimate = Estimate::new(&network, Plan::new(&network)).watching(Some(watch.clone()));
@@ -74,6 +79,69 @@ fn the_service_gives_for_a_run_what_training_says_of_it() {
     model.estimator.run(&row, &mut alone);
     let last = &expected[expected.len() - 3..];
     assert!(alone.iter().zip(last).any(|(a, b)| (a - b).abs() > 1e-3), "{alone:?} {last:?}");
+}
+
+#[test]
+fn the_service_tells_the_network_the_friction_that_training_appended() {
+    let folder = Folder::new("friction");
+    let files = runs(&folder, 1, 4.0, ".mcap");
+    let reading = Reading { plays: small("default").plays(), truth_hz: 1000.0, ..Reading::default() };
+    let plays = reading.plays.len();
+    let watch = LoadCard {
+        expected: [0.02, 0.03, 0.01].map(|number| vec![number * 0.01; load_card::expected_len(plays)]),
+        pull: [[0.04, 1e-7, 0.0, 0.0]; 3],
+        noise_nm: [1e3; 3],
+        weight: [1.0, 2.0, 3.0],
+        travel_deg: [2e3; 3],
+        information: [1e-3; 3],
+        limit_kg: 1e5,
+        friction: Some([(-1.0, 1.0); 3]),
+    };
+    let mut one = data::read(&files, &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
+    load::append_friction(&watch, plays, &mut one);
+    // A network that answers with what it is told of friction.
+    let inputs = FEATURES + plays + 3;
+    assert_eq!(one.inputs.len(), one.rows() * inputs);
+    let mut weight = Array2::zeros((3, inputs));
+    (0..3).for_each(|motor| weight[[motor, FEATURES + plays + motor]] = 1.0);
+    let layers = vec![Dense { weight, bias: vec![0.0; 3], activation: Activation::Identity }];
+    let chain = Chain { shift: vec![0.0; inputs], scale: vec![1.0; inputs], layers, plays: reading.plays.clone(), friction: true };
+    let file = folder.file("friction.onnx");
+    std::fs::write(&file, onnx::write(&chain, &BTreeMap::new())).expect("model");
+    assert_eq!(onnx::read(&std::fs::read(&file).expect("model")).expect("as written").0, chain);
+    let network = ravenpose::model::network(&file).expect("the service's importer takes it");
+    assert_eq!((network.plays.len(), network.friction), (plays, 3));
+    let mut estimate = Estimate::new(&network, Plan::new(&network)).watching(Some(watch));
+    let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
+    let (mut found, mut row, mut time_ns) = (Vec::new(), [0.0_f32; FEATURES], 0);
+    while let Some(record) = source.next().expect("record") {
+        match record {
+            Record::State(state) => {
+                features::extract(&state, 0, &mut row);
+                time_ns += 1_000_000;
+                estimate.follow(&row, time_ns);
+                estimate.weigh(&row, time_ns);
+            }
+            Record::Truth(_) => {
+                let mut answer = [0.0; 3];
+                estimate.run(&row, &mut answer);
+                found.push(answer);
+            }
+        }
+    }
+    let expected: Vec<&[f32]> = one.inputs.chunks_exact(inputs).map(|row| &row[FEATURES + plays..]).collect();
+    assert_eq!(found.len(), expected.len());
+    let largest = expected.iter().map(|row| row[0].abs()).fold(0.0, f32::max);
+    let off = |(found, expected): (&[f32; 3], &&[f32])| {
+        found.iter().zip(*expected).map(|(found, expected)| (found - expected).abs()).fold(0.0, f32::max)
+    };
+    let worst = found.iter().zip(&expected).map(off).fold(0.0, f32::max);
+    assert!(largest > 1e-3 && worst < 1e-5 * largest.max(1.0), "{worst} of {largest} N·m");
+    assert_eq!(
+        (estimate.has_weighed(), estimate.friction_score()),
+        (false, Some(0.0)),
+        "four seconds are too few to call it unseen"
+    );
 }
 
 #[test]

@@ -49,6 +49,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         sides: Vec::new(),
         duration_s: wish.minutes.unwrap_or_default() * 60.0,
         run_s: wish.run_minutes * 60.0,
+        runs_per_session: 1,
         seed: wish.seed.unwrap_or_default(),
         homing_seed: wish.homing_seed,
         motion: Motion::Teleoperation,
@@ -57,8 +58,9 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
     let (files, summary) = files(wish, runs.len(), format)?;
     drop(ArmSimulation::new(model, None, 0, &[0.0; 8]).map_err(|error| format!("{}: {error}", model.name()))?);
     let total = runs.iter().map(Run::cycles).sum();
-    let offsets =
-        workers::all(&files, total, wish.threads, |index, watch| reaches(model, runs[index], &files[index], plan.seed, watch))?;
+    let offsets = workers::all(&files, files.len(), total, wish.threads, |index, watch| {
+        reaches(model, runs[index], &files[index], plan.seed, watch)
+    })?;
     let mut text = format!("robot = {}\nseed = {}\nruns = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offset) in runs.iter().zip(&files).zip(offsets) {
         let offset = &offset[..model.joint_count()];
@@ -96,7 +98,7 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
     let (files, summary) = files(wish, runs.len(), format)?;
     let seed = wish.homing_seed.or(wish.seed).unwrap_or_default();
     let total = runs.iter().map(|run| run.len() as u64).sum();
-    workers::all(&files, total, wish.threads, |index, watch| follow(model, &runs[index], &files[index], seed, watch))?;
+    workers::all(&files, files.len(), total, wish.threads, |index, watch| follow(model, &runs[index], &files[index], seed, watch))?;
     let mut text = format!("robot = {}\nruns = {}\n", model.name(), runs.len());
     for (run, file) in runs.iter().zip(&files) {
         let _ = writeln!(text, "{}: commands of {}", name(file), run.name);

@@ -21,6 +21,7 @@ pub(crate) struct Wish<'a> {
     pub(crate) motion: &'a str,
     pub(crate) format: Option<&'a str>,
     pub(crate) run_minutes: f64,
+    pub(crate) runs_per_session: Option<usize>,
     pub(crate) threads: Option<usize>,
 }
 
@@ -34,8 +35,17 @@ pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
             return Err(format!("{name} {value}: must be a number of minutes above 0; write {name} 10"));
         }
     }
+    if wish.runs_per_session == Some(0) {
+        return Err("--runs-per-session 0: a session has at least one run; write --runs-per-session 7".to_owned());
+    }
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
-    if model.as_raven().is_some() { raven::run(wish, model) } else { any_arm::run(wish, &model) }
+    if model.as_raven().is_some() {
+        return raven::run(wish, model);
+    }
+    if wish.runs_per_session.is_some() {
+        return Err(format!("--runs-per-session: {} is no RAVEN-II, whose runs alone make sessions; leave it out", model.name()));
+    }
+    any_arm::run(wish, &model)
 }
 
 /// Files of the runs, and the summary beside them: none may be there already. Makes the folder.

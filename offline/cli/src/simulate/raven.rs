@@ -37,6 +37,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         },
         duration_s: wish.minutes.unwrap_or_default() * 60.0,
         run_s: wish.run_minutes * 60.0,
+        runs_per_session: wish.runs_per_session.unwrap_or(1),
         seed: wish.seed.unwrap_or_default(),
         homing_seed: wish.homing_seed,
         motion: match wish.motion {
@@ -50,17 +51,25 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
     // Effects that cannot be are refused before anything is written.
     drop(Player::new(&plan, runs[0]).map_err(|error| format!("{}: {error}", model.name()))?);
     let total = runs.iter().map(Run::cycles).sum();
-    let offsets = workers::all(&files, total, wish.threads, |index, watch| {
-        let run = runs[index];
-        let mut player = Player::new(&plan, run).map_err(|error| error.to_string())?;
-        let offsets: Vec<[f64; JOINTS]> = plan.sides.iter().filter_map(|side| player.homing_offset(*side).copied()).collect();
-        let (seed, number) = (plan.seed.to_string(), (run.index + 1).to_string());
-        let metadata = [("seed", seed.as_str()), ("run", &number), ("motion", motion_of(run))];
-        write(&mut player, model.name(), &metadata, &files[index], watch)?;
+    let sessions: Vec<&[Run]> = runs.chunks(plan.runs_per_session).collect();
+    let offsets = workers::all(&files, sessions.len(), total, wish.threads, |session, watch| {
+        let mut last: Option<Player> = None;
+        let mut offsets: Vec<Vec<[f64; JOINTS]>> = Vec::new();
+        for run in sessions[session] {
+            let begun = last.as_ref().map_or_else(|| Player::new(&plan, *run), |last| last.followed_by(&plan, *run));
+            let mut player = begun.map_err(|error| error.to_string())?;
+            offsets.push(plan.sides.iter().filter_map(|side| player.homing_offset(*side).copied()).collect());
+            let (seed, number) = (plan.seed.to_string(), (run.index + 1).to_string());
+            let metadata = [("seed", seed.as_str()), ("run", &number), ("motion", motion_of(*run))];
+            write(&mut player, model.name(), &metadata, &files[run.index], watch)?;
+            last = Some(player);
+        }
         Ok(offsets)
     })?;
+    let offsets: Vec<Vec<[f64; JOINTS]>> = offsets.into_iter().flatten().collect();
     let homing = plan.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"));
-    let mut text = format!("robot = {}\nseed = {}\n{homing}runs = {}\n", model.name(), plan.seed, runs.len());
+    let session = if plan.runs_per_session > 1 { format!("runs per session = {}\n", plan.runs_per_session) } else { String::new() };
+    let mut text = format!("robot = {}\nseed = {}\n{homing}{session}runs = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offsets) in runs.iter().zip(&files).zip(&offsets) {
         let _ = write!(text, "{}: {:.3} s, {}", name(file), run.duration_s, motion_of(*run));
         for (side, offset) in plan.sides.iter().zip(offsets) {
@@ -86,11 +95,11 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
         .map(|(index, run)| {
             let duration_s = run.time_s[run.len() - 1] - run.time_s[0] + 1e-3;
             let seed = wish.seed.unwrap_or_default();
-            Run { index, seed, homing_seed: wish.homing_seed.unwrap_or(seed), duration_s, zigzag: false }
+            Run { index, seed, homing_seed: wish.homing_seed.unwrap_or(seed), duration_s, zigzag: false, in_session: 0 }
         })
         .collect();
     let total = runs.iter().map(Run::cycles).sum();
-    workers::all(&files, total, wish.threads, |index, watch| {
+    workers::all(&files, files.len(), total, wish.threads, |index, watch| {
         let mut player = Player::following(model, &recorded[index], runs[index]).map_err(|error| error.to_string())?;
         let number = (index + 1).to_string();
         write(&mut player, model.name(), &[("run", &number), ("motion", "commands of a recording")], &files[index], watch)

@@ -19,9 +19,10 @@ impl Watch {
     }
 }
 
-/// Makes every file by `make`, given its place; returns what `make` returned, in order. `total` cycles are 100 %.
+/// Makes every file by `tasks` calls of `make`, given the number of each; returns what `make` returned, in order. `total` cycles are 100 %.
 pub(super) fn all<T: Send>(
     files: &[PathBuf],
+    tasks: usize,
     total: u64,
     threads: Option<usize>,
     make: impl Fn(usize, &Watch) -> Result<T, String> + Sync,
@@ -29,12 +30,12 @@ pub(super) fn all<T: Send>(
     let next = AtomicUsize::new(0);
     let watch = Watch { cycles: AtomicU64::new(0), stop: AtomicBool::new(false) };
     let failure: Mutex<Option<String>> = Mutex::new(None);
-    let made: Mutex<Vec<Option<T>>> = Mutex::new(files.iter().map(|_| None).collect());
-    let count = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, files.len());
+    let made: Mutex<Vec<Option<T>>> = Mutex::new((0..tasks).map(|_| None).collect());
+    let count = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, tasks.max(1));
     let work = || {
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= files.len() || watch.stop.load(Ordering::Relaxed) {
+            if index >= tasks || watch.stop.load(Ordering::Relaxed) {
                 return;
             }
             match make(index, &watch) {

@@ -27,7 +27,8 @@ pub struct Trajectory {
     pub name: String,
     /// Time of each row, s.
     pub time_s: Vec<f64>,
-    /// Row-major, [`DataSet::inputs`] numbers per row, units as in the file.
+    /// Row-major, [`DataSet::inputs`] numbers per row, units as in the file. A RAVEN-II's 118 features come first, the places of a memory
+    /// next, the friction last.
     pub inputs: Vec<f32>,
     /// Row-major, [`DataSet::outputs`] numbers per row: what a model is to give, as the truth says (mm for a RAVEN-II).
     pub labels: Vec<f32>,
@@ -94,8 +95,9 @@ impl Trajectory {
         }
         for row in (0..self.rows()).filter(|row| age_s.contains(&self.unsettled_s[*row])) {
             found.time_s.push(self.time_s[row]);
-            found.inputs.extend_from_slice(&self.inputs[row * inputs..(row + 1) * inputs - places]);
-            found.inputs.extend_from_slice(&self.young_places[row * places..(row + 1) * places]);
+            found.inputs.extend_from_slice(&self.inputs[row * inputs..(row + 1) * inputs]);
+            let at = found.inputs.len() - inputs + FEATURES;
+            found.inputs[at..at + places].copy_from_slice(&self.young_places[row * places..(row + 1) * places]);
             found.labels.extend_from_slice(&self.labels[row * outputs..(row + 1) * outputs]);
             found.exact.extend_from_slice(&self.exact[row * outputs..(row + 1) * outputs]);
         }
@@ -128,8 +130,8 @@ impl Trajectory {
         let inputs = self.inputs.len() / self.rows().max(1);
         if places > 0 {
             for row in (0..self.rows()).step_by(every) {
-                self.inputs[(row + 1) * inputs - places..(row + 1) * inputs]
-                    .copy_from_slice(&self.young_places[row * places..(row + 1) * places]);
+                let at = row * inputs + FEATURES;
+                self.inputs[at..at + places].copy_from_slice(&self.young_places[row * places..(row + 1) * places]);
             }
         }
     }
@@ -197,6 +199,8 @@ pub struct Reading {
     pub seed: u64,
     /// Memory of the recent motion that is appended to the inputs of a RAVEN-II.
     pub plays: Vec<Play>,
+    /// Is the friction of motors 1 to 3 appended behind it, as the observer that is fitted to the training rows sees it?
+    pub friction: bool,
     /// Arm of a RAVEN-II.
     pub arm: Side,
     /// What of its tip is learnt.
@@ -212,10 +216,18 @@ impl Default for Reading {
             truth_noise: 0.0,
             seed: 0,
             plays: Vec::new(),
+            friction: false,
             arm: Side::Gold,
             target: Quantity::Position,
             columns: None,
         }
+    }
+}
+
+impl Reading {
+    /// Is friction appended? It stands behind the places of a memory and has no form without one.
+    pub fn tells_friction(&self) -> bool {
+        self.friction && !self.plays.is_empty()
     }
 }
 

@@ -1,6 +1,6 @@
 //! How often the bound that the card states holds, and how often its domain is left: computed as the service does.
 
-use super::{FarOff, Load, Rest, Trust, Unsettled};
+use super::{FarOff, Friction, Load, Rest, Trust, Unsettled};
 use crate::card::{VALIDATION_RMS, distance};
 use crate::commands::Model;
 use crate::data::Trajectory;
@@ -67,8 +67,9 @@ pub(super) fn trust(
         };
         let weighed: Vec<Weighed> = test.iter().map(weighed).collect();
         trust.load = Some(observed(card, test, estimates, &trust, &weighed));
-        let unseen = weighed.iter().flat_map(|one| &one.unseen);
-        doubtful.iter_mut().zip(unseen).for_each(|(doubtful, unseen)| *doubtful |= unseen);
+        trust.friction = card.friction.map(|_| told(test, &weighed));
+        let unseen = weighed.iter().flat_map(|one| one.unseen.iter().zip(&one.friction_unseen));
+        doubtful.iter_mut().zip(unseen).for_each(|(doubtful, (load, friction))| *doubtful |= load | friction);
     }
     trust.far_off = model.number(VALIDATION_RMS).map(|rms| far_off(3.0 * rms, test, estimates, &doubtful));
     trust.unsettled = AGES_S.iter().filter_map(|age_s| unsettled(model, test, &trust.bound95_unsettled, age_s)).collect();
@@ -114,6 +115,17 @@ fn observed(card: &LoadCard, test: &[Trajectory], estimates: &[Rest], trust: &Tr
         unseen_from_s: test.iter().zip(weighed).map(first).collect(),
         unseen: percent(all().filter(|unseen| **unseen).count(), all().count().max(1)),
         coverage_of_rest: percent(inside, others),
+    }
+}
+
+fn told(test: &[Trajectory], weighed: &[Weighed]) -> Friction {
+    let first =
+        |(one, weighed): (&Trajectory, &Weighed)| Some(one.time_s[weighed.friction_unseen.iter().position(|unseen| *unseen)?]);
+    let all = || weighed.iter().flat_map(|one| &one.friction_unseen);
+    Friction {
+        end_nm: weighed.iter().filter_map(|one| one.friction_nm.last().copied()).collect(),
+        unseen_from_s: test.iter().zip(weighed).map(first).collect(),
+        unseen: percent(all().filter(|unseen| **unseen).count(), all().count().max(1)),
     }
 }
 

@@ -8,10 +8,11 @@ mod page;
 use crate::commands::{Model, truth_noise_key, write_whole};
 use crate::data::{self, Reading, Sketch, Trajectory};
 use crate::error::{TrainingError, shown};
-use crate::rivals;
+use crate::{load, rivals};
 use metrics::{AllFigures, Interval, Rest};
 use ravenpose::card::{Card, CardError};
 use ravenpose::correction::Quantity;
+use ravenpose::load::MOTORS;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -87,6 +88,8 @@ pub struct Trust {
     pub bound95_unsettled: Vec<f64>,
     /// What the motors' torque says about a load; none if the card says nothing of it.
     pub load: Option<Load>,
+    /// What it says about friction; none for a model that is not told.
+    pub friction: Option<Friction>,
     /// Rows that are far off; none if the card does not say what is far.
     pub far_off: Option<FarOff>,
 }
@@ -125,15 +128,47 @@ impl std::fmt::Display for Load {
         let Self { limit_kg, mass_kg, unseen_from_s, unseen, coverage_of_rest } = self;
         let masses: Vec<String> = mass_kg.iter().map(|mass| format!("{mass:.2}")).collect();
         write!(f, "load weighed {} kg; unseen_load (beyond {limit_kg:.2} kg) in {unseen:.1} % of the rows", masses.join(", "))?;
-        if unseen_from_s.iter().any(Option::is_some) {
-            let from = |from_s: &Option<f64>| from_s.map_or("never".to_owned(), |from_s| format!("{from_s:.0} s"));
-            write!(f, ", from {} on", unseen_from_s.iter().map(from).collect::<Vec<_>>().join(", "))?;
-        }
+        from(f, unseen_from_s)?;
         if coverage_of_rest.is_finite() {
             write!(f, "; the bound holds in {coverage_of_rest:.1} % of the others")?;
         }
         Ok(())
     }
+}
+
+/// What the service would tell the network of friction, did it start with each run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Friction {
+    /// Estimate of motors 1 to 3 at the end of each run, N·m beyond the usual.
+    pub end_nm: Vec<[f32; MOTORS]>,
+    /// When each run said `unseen_friction` first, s; none if it never did.
+    pub unseen_from_s: Vec<Option<f64>>,
+    /// Rows that say `unseen_friction`, percent.
+    pub unseen: f64,
+}
+
+impl std::fmt::Display for Friction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of_run =
+            |run: &[f32; MOTORS]| run.iter().map(|friction| format!("{:.0}", friction * 1e3)).collect::<Vec<_>>().join(" ");
+        let ends: Vec<String> = self.end_nm.iter().map(of_run).collect();
+        write!(
+            f,
+            "friction of motors 1 to 3 beyond the usual {} mN·m; unseen_friction in {:.1} % of the rows",
+            ends.join(", "),
+            self.unseen
+        )?;
+        from(f, &self.unseen_from_s)
+    }
+}
+
+/// `, from never, 20 s on`; nothing where it never was.
+fn from(f: &mut std::fmt::Formatter<'_>, from_s: &[Option<f64>]) -> std::fmt::Result {
+    if from_s.iter().all(Option::is_none) {
+        return Ok(());
+    }
+    let one = |from_s: &Option<f64>| from_s.map_or("never".to_owned(), |from_s| format!("{from_s:.0} s"));
+    write!(f, ", from {} on", from_s.iter().map(one).collect::<Vec<_>>().join(", "))
 }
 
 /// Rows that are off by more than three times the RMS on the validation trajectories, and how many of them the service would not have
@@ -245,9 +280,21 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         truth_noise: model.number(&truth_noise_key(target)).unwrap_or(0.0),
         target,
         plays: model.chain.plays.clone(),
+        friction: model.chain.friction,
         ..wish.reading.clone()
     };
-    let set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
+    let mut set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
+    // As the service reads it.
+    let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
+    let card = set.is_raven.then(|| Card::read(&model.card, target)).transpose().map_err(refused)?;
+    if let Some(card) = &card {
+        card.check_memory(model.chain.plays.len(), model.chain.frictions()).map_err(refused)?;
+    }
+    let load = card.as_ref().and_then(|card| card.load.as_ref());
+    if let (true, Some(load)) = (model.chain.friction, load) {
+        set.trajectories.iter_mut().for_each(|one| load::append_friction(load, model.chain.plays.len(), one));
+        set.input_names.extend(load::friction_names());
+    }
     if set.inputs() != model.chain.inputs() || set.outputs() != model.chain.outputs() {
         let what = format!(
             "maps {} inputs to {} outputs, the recordings have {} and {}",
@@ -276,7 +323,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             remedy: "give recordings of its states, without --inputs",
         });
     }
-    let own_inputs = set.inputs() - model.chain.plays.len();
+    let own_inputs = set.inputs() - model.chain.remembered();
     let (train, test, known) = parts(&model, set.trajectories);
     if test.is_empty() {
         return Err(TrainingError::Unfit {
@@ -284,12 +331,6 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             what: format!("all {known} recordings took part in its training or validation"),
             remedy: "give runs that it has not seen",
         });
-    }
-    // As the service reads it.
-    let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
-    let card = set.is_raven.then(|| Card::read(&model.card, target)).transpose().map_err(refused)?;
-    if let Some(card) = &card {
-        card.check_memory(model.chain.plays.len()).map_err(refused)?;
     }
     let judge = Judge::new(&test, outputs, wish.seed);
     let mut methods = vec![judge.raw(), judge.fixed_offset()];
@@ -311,7 +352,6 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
             methods.push(judge.method(name, what, &found, Some(train_s), Some(estimate_us)));
         }
     }
-    let load = card.as_ref().and_then(|card| card.load.as_ref());
     let trust = domain::trust(&model, target, load, &test, &estimates, &set.input_names);
     let mut notes = set.notes;
     if let Some(card) = &card {

@@ -132,6 +132,7 @@ fn trust(report: &Report, unit: &str) -> Vec<String> {
         lines.push(format!("By run {words}."));
     }
     lines.extend(trust.load.iter().map(|load| format!("By the motors' torque: {load}.")));
+    lines.extend(trust.friction.iter().map(|friction| format!("By the same torque: {friction}.")));
     lines.extend(trust.far_off.iter().map(|far_off| format!("{far_off}.")));
     lines.extend(trust.unsettled.iter().map(|unsettled| format!("By age, {unit}: {unsettled}.")));
     if !trust.leaving.is_empty() {

@@ -1,6 +1,6 @@
 //! The memory in front of the layers as nodes of the graph: the form that the importer's `memory.rs` describes and asks for.
 //!
-//! `memory` and `remembered` are inputs with default values, so that from the 118 features alone any runtime gives the answer of a
+//! `memory` and `remembered`, and `friction` if there is any, are inputs with default values, so that from the 118 features alone any runtime gives the answer of a
 //! memory that has seen nothing else; whoever hands `memory_out` back in, with `remembered` true, has the whole of it.
 
 use super::proto::{Attribute, Graph, Node, Tensor};
@@ -15,7 +15,7 @@ const BOOL: i32 = 9;
 pub(super) const NODES: usize = 8;
 
 /// Adds the nodes, ports and tensors; gives the name of what the first layer sees.
-pub(super) fn write(graph: &mut Graph, plays: &[Play]) -> String {
+pub(super) fn write(graph: &mut Graph, plays: &[Play], frictions: usize) -> String {
     let features: Vec<u8> = plays.iter().flat_map(|play| (play.input as i64).to_le_bytes()).collect();
     let widths: Vec<f32> = plays.iter().map(|play| play.half_width).collect();
     graph.initializer.extend([
@@ -26,6 +26,12 @@ pub(super) fn write(graph: &mut Graph, plays: &[Play]) -> String {
     ]);
     graph.input.extend([value("memory", FLOAT, plays.len()), value("remembered", BOOL, 1)]);
     graph.output.push(value("memory_out", FLOAT, plays.len()));
+    let mut seen = vec![INPUT, "memory.places"];
+    if frictions > 0 {
+        graph.initializer.push(tensor("friction", &[1, frictions], vec![0.0; frictions].iter()));
+        graph.input.push(value("friction", FLOAT, frictions));
+        seen.push("friction");
+    }
     let of = |operator: &str, inputs: &[&str], output: &str| {
         node(operator, output, inputs.iter().map(|name| (*name).to_owned()).collect(), output)
     };
@@ -37,7 +43,7 @@ pub(super) fn write(graph: &mut Graph, plays: &[Play]) -> String {
         of("Min", &["memory.above", "memory.upper"], "memory.moved"),
         of("Where", &["remembered", "memory.moved", "memory.x"], "memory_out"),
         of("Sub", &["memory.x", "memory_out"], "memory.places"),
-        along_rows(of("Concat", &[INPUT, "memory.places"], "memory.inputs")),
+        along_rows(of("Concat", &seen, "memory.inputs")),
     ]);
     "memory.inputs".to_owned()
 }
@@ -47,10 +53,12 @@ fn along_rows(mut node: Node) -> Node {
     node
 }
 
-/// The plays of a graph that [`write`] wrote; none where it has no memory.
-pub(super) fn read(graph: &Graph) -> Result<Vec<Play>, String> {
+/// The plays of a graph that [`write`] wrote, and whether it is told of friction; none where it has no memory.
+pub(super) fn read(graph: &Graph) -> Result<(Vec<Play>, bool), String> {
     let stored = |name: &str| graph.initializer.iter().find(|one| one.name == name);
-    let (Some(features), Some(widths)) = (stored("memory.features"), stored("memory.half_widths")) else { return Ok(Vec::new()) };
+    let (Some(features), Some(widths)) = (stored("memory.features"), stored("memory.half_widths")) else {
+        return Ok((Vec::new(), false));
+    };
     let widths = super::floats(widths)?;
     let features: Vec<i64> = features.raw_data.as_chunks::<8>().0.iter().map(|eight| i64::from_le_bytes(*eight)).collect();
     let operators = graph.node.iter().take(NODES).map(|node| node.op_type.as_str());
@@ -61,5 +69,6 @@ pub(super) fn read(graph: &Graph) -> Result<Vec<Play>, String> {
         Ok(input) if input < ravenpose_wire::FEATURES && half_width > 0.0 => Ok(Play { input, half_width }),
         _ => Err(format!("has a play of half width {half_width} on feature {feature}")),
     };
-    features.into_iter().zip(widths).map(play).collect()
+    let plays = features.into_iter().zip(widths).map(play).collect::<Result<_, _>>()?;
+    Ok((plays, graph.input.iter().any(|one| one.name == "friction")))
 }

@@ -23,9 +23,10 @@ const ACTIVATIONS: [Activation; 4] = [Activation::Sigmoid, Activation::Tanh, Act
 /// The bytes of an ONNX file; properties in the order of their keys, so that the same model gives the same bytes.
 pub fn write(chain: &Chain, metadata: &BTreeMap<String, String>) -> Vec<u8> {
     let mut graph = Graph { name: "ravenpose".to_owned(), ..Graph::default() };
-    graph.input.push(value(INPUT, FLOAT, chain.inputs() - chain.plays.len()));
+    graph.input.push(value(INPUT, FLOAT, chain.inputs() - chain.remembered()));
     graph.output.push(value(OUTPUT, FLOAT, chain.outputs()));
-    let mut current = if chain.plays.is_empty() { INPUT.to_owned() } else { memory::write(&mut graph, &chain.plays) };
+    let mut current =
+        if chain.plays.is_empty() { INPUT.to_owned() } else { memory::write(&mut graph, &chain.plays, chain.frictions()) };
     for (operator, name, values) in [("Sub", "shift", &chain.shift), ("Mul", "scale", &chain.scale)] {
         graph.initializer.push(tensor(name, &[values.len()], values.iter()));
         let out = format!("{name}.out");
@@ -87,7 +88,7 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
     let model = Model::decode(bytes).map_err(|error| format!("is no ONNX file: {error}"))?;
     let graph = model.graph.ok_or("has no graph")?;
     let tensors: BTreeMap<&str, &Tensor> = graph.initializer.iter().map(|one| (one.name.as_str(), one)).collect();
-    let plays = memory::read(&graph)?;
+    let (plays, friction) = memory::read(&graph)?;
     let mut nodes = graph.node.iter().skip(if plays.is_empty() { 0 } else { memory::NODES }).peekable();
     let mut next = |operator: &str| nodes.next_if(|node| node.op_type == operator);
     let vector = |node: Option<&Node>, at: usize| -> Result<Vec<f32>, String> {
@@ -106,12 +107,14 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
         let activation = ACTIVATIONS.into_iter().find(|one| one.operator().is_some_and(|operator| next(operator).is_some()));
         layers.push(Dense { weight, bias, activation: activation.unwrap_or(Activation::Identity) });
     }
-    let fits = plays.is_empty() || shift.len() == ravenpose_wire::FEATURES + plays.len();
-    if nodes.next().is_some() || layers.is_empty() || scale.len() != shift.len() || !fits {
+    let whole = nodes.next().is_none() && !layers.is_empty() && scale.len() == shift.len();
+    let chain = Chain { shift, scale, layers, plays, friction };
+    let fits = chain.plays.is_empty() || chain.inputs() == ravenpose_wire::FEATURES + chain.remembered();
+    if !whole || !fits {
         return Err("is not a chain that ravenpose wrote".to_owned());
     }
     let metadata = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
-    Ok((Chain { shift, scale, layers, plays }, metadata))
+    Ok((chain, metadata))
 }
 
 fn floats(tensor: &Tensor) -> Result<Vec<f32>, String> {
@@ -139,13 +142,13 @@ mod tests {
             activation,
         };
         let layers = vec![layer(5, inputs, Activation::Tanh), layer(6, 5, Activation::Elu), layer(3, 6, Activation::Identity)];
-        Chain { shift: vec![1.0; inputs], scale: vec![0.5; inputs], layers, plays: Vec::new() }
+        Chain { shift: vec![1.0; inputs], scale: vec![0.5; inputs], layers, plays: Vec::new(), friction: false }
     }
 
     /// Of a RAVEN-II's features, with two places behind them.
     fn with_memory() -> Chain {
         let plays = vec![Play { input: 56, half_width: 0.25 }, Play { input: 57, half_width: 3.0 }];
-        Chain { plays, ..of_width(ravenpose_wire::FEATURES + 2) }
+        Chain { plays, friction: true, ..of_width(ravenpose_wire::FEATURES + 5) }
     }
 
     #[test]

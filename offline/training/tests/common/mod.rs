@@ -51,6 +51,7 @@ pub(crate) fn runs_of(robot: Robot, seed: u64, folder: &Folder, count: usize, se
         run_s: seconds,
         seed,
         homing_seed: Some(7),
+        runs_per_session: 1,
         motion: Motion::Mixed,
     };
     plan.runs()
