@@ -204,7 +204,9 @@ impl Estimator for Estimate {
     }
 
     fn is_settled(&self) -> bool {
-        self.memory.is_settled()
+        let tells_friction = self.input.len() > FEATURES + self.memory.len();
+        let knows_friction = self.load.as_ref().is_some_and(LoadObserver::has_weighed);
+        self.memory.is_settled() && (knows_friction || !tells_friction)
     }
 
     fn run(&mut self, features: &[f32; FEATURES], error: &mut [f32; 3]) {

@@ -1,6 +1,7 @@
 //! Real processes, real shared memory, real signals: killed and restarted in any order, stopped at any phase, started twice.
 //!
-//! `RAVENPOSE_KILLS` sets the number of kills of each kind of process (50; `make faults` does 10,000).
+//! `RAVENPOSE_KILLS` sets the number of kills of each kind of process (50; `make faults` does 10,000), `RAVENPOSE_KILL_LANES` in how many
+//! worlds at a time (1).
 //!
 //! Shared machines stop for a good part of a second now and then. Therefore the service has wide limits here, what must come is waited
 //! for patiently, and times are judged while the machine runs, otherwise by their median. A service that its own watchdog ended because
@@ -29,8 +30,12 @@ fn machine() -> std::sync::MutexGuard<'static, ()> {
 const VALID: u32 = ArmStatus::Valid as u32;
 const STALE_NS: i64 = 1000 * STALE_US;
 
+fn number(variable: &str, default: u64) -> u64 {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
 fn kills() -> u64 {
-    std::env::var("RAVENPOSE_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(50)
+    number("RAVENPOSE_KILLS", 50)
 }
 
 /// A client that says `fresh` and the time at its first fresh pose, and `WRONG ...` at any fault.
@@ -124,6 +129,114 @@ impl Monitor {
     }
 }
 
+/// What came of the kills in one world. Of each victim: how long until a fresh pose, until a valid one.
+#[derive(Default)]
+struct Survived {
+    times: [[Vec<i64>; 2]; 3],
+    /// Shared files at first and at most.
+    files: [usize; 2],
+    ended_itself: u64,
+}
+
+const KILL_TEST: &str = "fifty_kills_of_each_process_in_random_order_are_survived";
+
+/// So many kills of each process of one world.
+fn survive(name: &str, seed: u64, kills: u64, stalls: &Stalls) -> Survived {
+    let world = World::new(name);
+    let config = world.config(CONFIG);
+    let mut service = world.start(&config, &[]);
+    let mut publisher = world.role(KILL_TEST, "publisher");
+    let mut client = world.role(KILL_TEST, "client");
+    let mut client_output = words_of(&mut client);
+    hears_fresh(&mut client_output);
+    let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
+    monitor.watch_ms(300);
+    let baseline = common::shared_files(&world.settings.prefix).len();
+    println!("{name}: seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
+    let mut rng = common::Rng(seed);
+    let mut survived = Survived { files: [baseline; 2], ..Survived::default() };
+    let mut left = [kills; 3];
+    for kill in 0..3 * kills {
+        // Any order, the same number of each.
+        let mut victim = rng.below(3) as usize;
+        while left[victim] == 0 {
+            victim = (victim + 1) % 3;
+        }
+        left[victim] -= 1;
+        let pause = Duration::from_millis(rng.below(50));
+        monitor.look();
+        let stops = stalls.stops();
+        match victim {
+            0 => {
+                publisher.kill();
+                std::thread::sleep(pause);
+                monitor.restart();
+                publisher = world.role(KILL_TEST, "publisher");
+            }
+            1 => {
+                service.kill();
+                std::thread::sleep(pause);
+                monitor.restart();
+                service = world.start(&config, &[]);
+            }
+            _ => {
+                client.kill();
+                nothing_wrong(&mut client_output);
+                std::thread::sleep(pause);
+                monitor.restart();
+                client = world.role(KILL_TEST, "client");
+                client_output = words_of(&mut client);
+            }
+        }
+        let mut begun = monitor.since;
+        // What others had of the core until a fresh and until a valid pose.
+        let mut waited = [0; 2];
+        while monitor.valid.is_none() {
+            let was_fresh = monitor.fresh.is_some();
+            monitor.watch_ms(1);
+            // The first look comes after the start, and may find a fresh pose at once.
+            let so_far = waited_ns([&publisher, &service, &client][victim]);
+            waited = [if was_fresh { waited[0] } else { so_far }, so_far];
+            if service.0.try_wait().expect("status").is_some() {
+                assert!(
+                    world.log().contains("the loop is stuck"),
+                    "{name}: kill {kill} of {victim}: the service ended\n{}",
+                    world.log()
+                );
+                survived.ended_itself += 1;
+                monitor.restart();
+                begun = monitor.since;
+                service = world.start(&config, &[]);
+            }
+            let waited = Duration::from_nanos((now_ns() - begun) as u64);
+            assert!(waited < PATIENCE, "{name}: kill {kill} of {victim}: never valid again\n{}", world.log());
+        }
+        let mut fresh = monitor.fresh.expect("fresh before valid");
+        if victim == 2 {
+            fresh = fresh.max(hears_fresh(&mut client_output));
+        }
+        let took = [fresh - begun, monitor.valid.expect("valid") - begun];
+        // While the machine runs, each of them is quick but for the time that others had its core; else half of them have to be.
+        let own = [took[0] - waited[0], took[1] - waited[1]];
+        assert!(
+            stalls.stops() > stops || quick(own),
+            "{name}: kill {kill} of {victim}: {took:?} ns, of which others had the core for {waited:?}\n{}",
+            world.log()
+        );
+        for (all, one) in survived.times[victim].iter_mut().zip(took) {
+            all.push(one);
+        }
+        survived.files[1] = survived.files[1].max(common::shared_files(&world.settings.prefix).len());
+        monitor.watch_ms(5 + rng.below(40) as i64);
+        if (kill + 1) % 1000 == 0 {
+            println!("{name}: {} of {} kills survived", kill + 1, 3 * kills);
+        }
+    }
+    client.kill();
+    nothing_wrong(&mut client_output);
+    survived
+}
+
 #[test]
 fn fifty_kills_of_each_process_in_random_order_are_survived() {
     match role().as_deref() {
@@ -131,130 +244,52 @@ fn fifty_kills_of_each_process_in_random_order_are_survived() {
         Some("client") => client(),
         _ => {}
     }
-    let test = "fifty_kills_of_each_process_in_random_order_are_survived";
     let _machine = machine();
     despite_stops(|| {
-        let world = World::new("kill");
-        let config = world.config(CONFIG);
-        let mut service = world.start(&config, &[]);
-        let mut publisher = world.role(test, "publisher");
-        let mut client = world.role(test, "client");
-        let mut client_output = words_of(&mut client);
-        hears_fresh(&mut client_output);
+        let (seed, lanes) = (number("RAVENPOSE_KILL_SEED", 20_261_121), number("RAVENPOSE_KILL_LANES", 1).max(1));
         let stalls = Stalls::measure();
-        let mut monitor = Monitor { reader: world.poses(), fresh: None, valid: None, since: 0 };
-        monitor.watch_ms(300);
-        let baseline = common::shared_files(&world.settings.prefix).len();
-        let seed = std::env::var("RAVENPOSE_KILL_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_261_121);
-        println!("seed {seed} (RAVENPOSE_KILL_SEED), {baseline} shared files at first");
-        let mut rng = common::Rng(seed);
-        // Of each victim: how long until a fresh pose, until a valid one.
-        let mut times: [[Vec<i64>; 2]; 3] = Default::default();
-        let mut most_files = baseline;
-        let mut left = [kills(); 3];
-        let mut ended_itself = 0;
-        for kill in 0..3 * kills() {
-            // Any order, the same number of each.
-            let mut victim = rng.below(3) as usize;
-            while left[victim] == 0 {
-                victim = (victim + 1) % 3;
-            }
-            left[victim] -= 1;
-            let pause = Duration::from_millis(rng.below(50));
-            monitor.look();
-            let stops = stalls.stops();
-            match victim {
-                0 => {
-                    publisher.kill();
-                    std::thread::sleep(pause);
-                    monitor.restart();
-                    publisher = world.role(test, "publisher");
-                }
-                1 => {
-                    service.kill();
-                    std::thread::sleep(pause);
-                    monitor.restart();
-                    service = world.start(&config, &[]);
-                }
-                _ => {
-                    client.kill();
-                    nothing_wrong(&mut client_output);
-                    std::thread::sleep(pause);
-                    monitor.restart();
-                    client = world.role(test, "client");
-                    client_output = words_of(&mut client);
-                }
-            }
-            let mut begun = monitor.since;
-            // What others had of the core until a fresh and until a valid pose.
-            let mut waited = [0; 2];
-            while monitor.valid.is_none() {
-                let was_fresh = monitor.fresh.is_some();
-                monitor.watch_ms(1);
-                // The first look comes after the start, and may find a fresh pose at once.
-                let so_far = waited_ns([&publisher, &service, &client][victim]);
-                waited = [if was_fresh { waited[0] } else { so_far }, so_far];
-                if service.0.try_wait().expect("status").is_some() {
-                    assert!(
-                        world.log().contains("the loop is stuck"),
-                        "kill {kill} of {victim}: the service ended\n{}",
-                        world.log()
-                    );
-                    ended_itself += 1;
-                    monitor.restart();
-                    begun = monitor.since;
-                    service = world.start(&config, &[]);
-                }
-                let waited = Duration::from_nanos((now_ns() - begun) as u64);
-                assert!(waited < PATIENCE, "kill {kill} of {victim}: never valid again\n{}", world.log());
-            }
-            let mut fresh = monitor.fresh.expect("fresh before valid");
-            if victim == 2 {
-                fresh = fresh.max(hears_fresh(&mut client_output));
-            }
-            let took = [fresh - begun, monitor.valid.expect("valid") - begun];
-            // While the machine runs, each of them is quick but for the time that others had its core; else half of them have to be.
-            let own = [took[0] - waited[0], took[1] - waited[1]];
-            assert!(
-                stalls.stops() > stops || quick(own),
-                "kill {kill} of {victim}: {took:?} ns, of which others had the core for {waited:?}\n{}",
-                world.log()
-            );
-            for (all, one) in times[victim].iter_mut().zip(took) {
-                all.push(one);
-            }
-            most_files = most_files.max(common::shared_files(&world.settings.prefix).len());
-            monitor.watch_ms(5 + rng.below(40) as i64);
-        }
-        for (victim, times) in ["publisher", "service", "client"].iter().zip(&mut times) {
-            for all in times.iter_mut() {
+        let survived: Vec<Survived> = std::thread::scope(|scope| {
+            let stalls = &stalls;
+            let kills_of = |lane: u64| kills() / lanes + u64::from(lane < kills() % lanes);
+            let lane = |lane: u64| scope.spawn(move || survive(&format!("kill{lane}"), seed + lane, kills_of(lane), stalls));
+            let all: Vec<_> = (0..lanes).map(lane).collect();
+            all.into_iter().map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        });
+        for (victim, name) in ["publisher", "service", "client"].iter().enumerate() {
+            let mut times: [Vec<i64>; 2] =
+                [0, 1].map(|kind| survived.iter().flat_map(|one| &one.times[victim][kind]).copied().collect());
+            for all in &mut times {
                 all.sort_unstable();
             }
             let [median, most] = [2, 1].map(|part| times.each_ref().map(|all| all[(all.len() - 1) / part]));
             let ms = |ns: i64| ns / 1_000_000;
             println!(
-                "{} kills of the {victim}, with its start: reconnected after {} ms in the median and {} ms at most, valid after {} and {} ms",
-                kills(),
+                "{} kills of the {name}, with its start: reconnected after {} ms in the median and {} ms at most, valid after {} and {} ms",
+                times[0].len(),
                 ms(median[0]),
                 ms(most[0]),
                 ms(median[1]),
                 ms(most[1])
             );
-            assert!(quick(median), "{victim}: half of the times are longer than {median:?} ns");
+            assert_eq!(times[0].len() as u64, kills());
+            assert!(quick(median), "{name}: half of the times are longer than {median:?} ns");
         }
+        let ended_itself: u64 = survived.iter().map(|one| one.ended_itself).sum();
         println!(
-            "shared files {baseline} at first, {most_files} at most; the machine stopped {} times for more than {} ms, {} times for more than {} ms, for {} ms in all; {ended_itself} times the service ended itself",
+            "the machine stopped {} times for more than {} ms, {} times for more than {} ms, for {} ms in all; {ended_itself} times the service ended itself",
             stalls.stops(),
             stalls::LATE_NS / 1_000_000,
             stalls.long_stops(),
             stalls::LONG_NS / 1_000_000,
             stalls.lost_ns() / 1_000_000
         );
-        assert!(ended_itself <= stalls.long_stops() + kills() / 100, "the service ended itself {ended_itself} times");
-        // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
-        assert!(most_files <= 2 * baseline + 4, "leftovers grow: {most_files} from {baseline}");
-        client.kill();
-        nothing_wrong(&mut client_output);
+        // Each stop may end the service of every world.
+        assert!(ended_itself <= lanes * stalls.long_stops() + kills() / 100, "the service ended itself {ended_itself} times");
+        for [baseline, most] in survived.iter().map(|one| one.files) {
+            println!("shared files {baseline} at first, {most} at most");
+            // A killed process leaves its files until the next one starts and cleans up: a few at a time, never more and more.
+            assert!(most <= 2 * baseline + 4, "leftovers grow: {most} from {baseline}");
+        }
     });
 }
 

@@ -23,6 +23,8 @@ const RANGE_MARGIN: f64 = 0.05;
 /// Share of the validation rows that lie within the limit of the domain, and room beyond it.
 const DOMAIN_SHARE: f64 = 0.999;
 const DOMAIN_ROOM: f64 = 1.1;
+/// One row in so many is looked at without its friction.
+const FRICTION_EVERY: usize = 8;
 /// Golden pairs in a card.
 const GOLDEN: usize = 8;
 /// Room of the correction bound beyond the largest estimate seen.
@@ -98,13 +100,19 @@ fn half_width(mut lengths: Vec<f64>, noise: f64) -> f64 {
     second.sqrt() * (NORMAL_975 + (NORMAL_975.powi(3) - 3.0 * NORMAL_975) / 24.0 * excess)
 }
 
-/// The same while a memory has not settled: the widest over its ages, and no narrower than `settled`, that of one that has. None where
-/// no memory was unsettled.
-fn unsettled_bounds(chain: &Chain, validation: &[Trajectory], settled: &[f64]) -> Option<Vec<f64>> {
+/// The same while a memory has not settled: the widest over its ages and of runs whose friction is not known, and no narrower than
+/// `settled`, that of one that has. None where no memory was unsettled. How far friction can be from the usual three validation
+/// runs do not tell: for that the training runs count too, whose errors are hardly smaller.
+fn unsettled_bounds(chain: &Chain, train: &[Trajectory], validation: &[Trajectory], settled: &[f64]) -> Option<Vec<f64>> {
     let of_age = |age_s| bounds(chain, &validation.iter().map(|one: &Trajectory| one.unsettled(age_s)).collect::<Vec<_>>());
-    let ages: Vec<Vec<f64>> = AGES_S.iter().map(of_age).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())).collect();
+    let unknown = chain.friction.then(|| {
+        let runs: Vec<Trajectory> = train.iter().chain(validation).map(|one| load::without_friction(one, FRICTION_EVERY)).collect();
+        bounds(chain, &runs)
+    });
+    let all = AGES_S.iter().map(of_age).chain(unknown);
+    let found: Vec<Vec<f64>> = all.filter(|bounds| bounds.iter().all(|bound| bound.is_finite())).collect();
     let wider = |widest: Vec<f64>, bounds: &Vec<f64>| widest.iter().zip(bounds).map(|(a, b)| a.max(*b)).collect();
-    (!ages.is_empty()).then(|| ages.iter().fold(settled.to_vec(), wider))
+    (!found.is_empty()).then(|| found.iter().fold(settled.to_vec(), wider))
 }
 
 /// The smallest value with at least this share of all at or below it.
@@ -129,7 +137,7 @@ pub fn card(facts: &Facts) -> BTreeMap<String, String> {
         if !boards.contains(&0) {
             put("ravenpose.boards", words(&boards.into_iter().collect::<Vec<_>>()));
         }
-        if let Some(wider) = unsettled_bounds(facts.chain, facts.validation, &settled) {
+        if let Some(wider) = unsettled_bounds(facts.chain, facts.train, facts.validation, &settled) {
             put(keys.bound95_unsettled, words(&wider));
         }
         let largest = facts.train.iter().chain(facts.validation).flat_map(|one| {

@@ -26,7 +26,7 @@ const BETWEEN_S: f64 = 1.0;
 /// Less motion than this many averages long shows nothing about how far they stray.
 const MOTION_MIN_S: f64 = 5.0 * AVERAGED_S;
 /// The range of friction is widened by this share of itself on both sides.
-const FRICTION_ROOM: f32 = 0.1;
+const FRICTION_ROOM: f32 = 0.2;
 /// Share of the rows that stay below the limit, and room beyond it.
 const LIMIT_SHARE: f64 = 0.999;
 const LIMIT_ROOM: f64 = 1.1;
@@ -122,14 +122,30 @@ pub fn friction_names() -> impl Iterator<Item = String> {
     (1..=MOTORS).map(|motor| format!("friction_{motor}_nm"))
 }
 
-/// Appends to each row the friction that an observer sees which begins with the trajectory: as a service does that has just started.
+/// Appends to each row the friction that an observer sees which begins with the trajectory: as a service does that has just started. The
+/// memory has settled when the observer has weighed, too.
 pub fn append_friction(card: &LoadCard, plays: usize, one: &mut Trajectory) {
     let mut observer = LoadObserver::new(card.clone());
+    let mut weighed_after_s: Option<f64> = None;
     let seen = one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s).flat_map(|(row, time_s)| {
         observer.follow(row, (time_s * 1e9).round() as i64);
+        weighed_after_s = weighed_after_s.or(observer.has_weighed().then_some(*time_s));
         [row, &observer.friction_nm()].concat()
     });
     one.inputs = seen.collect();
+    one.settled_after_s = one.settled_after_s.zip(weighed_after_s).map(|(memory_s, friction_s)| memory_s.max(friction_s));
+}
+
+/// A trajectory whose friction nobody knew: one row in so many.
+#[must_use]
+pub fn without_friction(one: &Trajectory, every: usize) -> Trajectory {
+    let mut unknown = one.clone();
+    unknown.thin(every);
+    let width = unknown.inputs.len() / unknown.rows().max(1);
+    for row in unknown.inputs.chunks_exact_mut(width.max(1)) {
+        row[width - MOTORS..].fill(0.0);
+    }
+    unknown
 }
 
 /// Least and largest friction of each motor that observers see which begin with each trajectory, once they have weighed, or at all where
