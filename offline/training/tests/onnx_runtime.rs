@@ -7,6 +7,7 @@
 mod common;
 
 use common::{Folder, python, runs, small};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading};
@@ -30,17 +31,74 @@ for row in rows:
 numpy.concatenate(alone + in_order).astype('<f4').tofile(sys.argv[3])
 ";
 
-#[test]
-fn onnx_runtime_gives_what_the_card_says() {
+/// Python with ONNX Runtime; none, and said so, where it is not.
+fn with_runtime() -> Option<PathBuf> {
     let Some(python) = python() else {
         println!("skipped: RAVENPOSE_PYTHON is absent (make test makes one)");
-        return;
+        return None;
     };
     let imports = Command::new(&python).args(["-c", "import numpy, onnx, onnxruntime"]).output();
     if !imports.is_ok_and(|output| output.status.success()) {
         println!("skipped: onnx, onnxruntime or numpy is absent from {}", python.display());
-        return;
+        return None;
     }
+    Some(python)
+}
+
+/// Rows of features alone, then the same with this friction.
+const FRICTION: &str = "
+import sys, numpy, onnx, onnxruntime
+onnx.checker.check_model(onnx.load(sys.argv[1]), full_check=True)
+session = onnxruntime.InferenceSession(sys.argv[1])
+rows = numpy.fromfile(sys.argv[2], '<f4').reshape(-1, 118)
+friction = numpy.array([[float(word) for word in sys.argv[4:]]], '<f4')
+out = [session.run(['output'], {'input': row[None]})[0] for row in rows]
+out += [session.run(['output'], {'input': row[None], 'friction': friction})[0] for row in rows]
+numpy.concatenate(out).astype('<f4').tofile(sys.argv[3])
+";
+
+#[test]
+fn the_shipped_models_say_in_onnx_runtime_what_their_cards_say_and_take_friction() {
+    let Some(python) = with_runtime() else { return };
+    let folder = Folder::new("shipped");
+    for name in ["raven2-worn.onnx", "raven2-worn-orientation.onnx"] {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(name);
+        let Model { chain, card } = Model::read(&file).expect(name);
+        assert!(chain.friction && chain.inputs() == 118 + 21 + 3, "{name}");
+        let golden: Vec<Vec<f64>> = card["ravenpose.golden"]
+            .lines()
+            .map(|line| line.split_whitespace().map(|word| word.parse().expect("a number")).collect())
+            .collect();
+        let inputs = golden.iter().map(|pair| pair[..118].iter().map(|value| *value as f32).collect::<Vec<f32>>());
+        let bytes: Vec<u8> = inputs.clone().flatten().flat_map(f32::to_le_bytes).collect();
+        std::fs::write(folder.file("in"), bytes).expect("inputs");
+        let friction = [0.004_f32, -0.003, 0.012];
+        let ran = Command::new(&python)
+            .args(["-c", FRICTION])
+            .args([&file, &folder.file("in"), &folder.file("out")])
+            .args(friction.map(|value| value.to_string()))
+            .output()
+            .expect("python");
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        let found = std::fs::read(folder.file("out")).expect("outputs");
+        let found: Vec<f64> =
+            found.chunks_exact(4).map(|four| f64::from(f32::from_le_bytes([four[0], four[1], four[2], four[3]]))).collect();
+        let alone = golden.iter().flat_map(|pair| pair[118..].to_vec());
+        let told = inputs.flat_map(|row| chain.estimate_exactly(&[&row[..], &[0.0; 21], &friction].concat()));
+        let expected: Vec<f64> = alone.chain(told).collect();
+        assert_eq!(found.len(), expected.len(), "{name}");
+        let off = |(found, expected): (&f64, &f64)| (found - expected).abs() / expected.abs().max(1.0);
+        let worst = found.iter().zip(&expected).map(off).fold(0.0, f64::max);
+        assert!(worst <= 2e-5, "{name}: {worst}");
+        // And it matters.
+        let half = found.len() / 2;
+        assert!(found[..half].iter().zip(&found[half..]).any(|(alone, told)| (alone - told).abs() > 1e-2), "{name}");
+    }
+}
+
+#[test]
+fn onnx_runtime_gives_what_the_card_says() {
+    let Some(python) = with_runtime() else { return };
     let folder = Folder::new("runtime");
     let files = runs(&folder, 3, 3.0, ".mcap");
     for preset in ["default", "one-state", "paper", "paper-code"] {
