@@ -78,7 +78,7 @@ test: offline examples venv
 	tests/run.sh $(STAGE) $(PYTHON)
 
 # 10,000 kills and restarts of each process in KILL_LANES worlds at a time, and a hundred million cycles of mixed faults: hours.
-KILL_LANES ?= 4
+KILL_LANES ?= 3
 faults: build
 	RAVENPOSE_KILLS=10000 RAVENPOSE_KILL_LANES=$(KILL_LANES) $(CARGO) test $(CARGO_FLAGS) --workspace --test processes -- --nocapture fifty_kills
 	RAVENPOSE_FAULT_CYCLES=100000000 $(CARGO) test $(CARGO_FLAGS) --workspace --test faults -- --nocapture a_million_cycles
