@@ -73,18 +73,17 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     Err(last.unwrap_or(NotExactEnough { format: Format::F32, worst: f64::NAN, limit }))
 }
 
-/// The mean of what goes into each layer, over as many random inputs.
-pub(super) fn mean_inputs(network: &Network, count: usize) -> Vec<Vec<f64>> {
+/// What goes into each layer, layer by layer, over as many random inputs as are asked for: others than those that deviations are
+/// measured on.
+pub(super) fn examples(network: &Network, count: usize) -> Vec<Vec<Vec<f64>>> {
     let mut random = Random::new(0x00CA_11B0);
-    let mut means: Vec<Vec<f64>> = network.layers.iter().map(|layer| vec![0.0; layer.inputs]).collect();
+    let mut examples: Vec<Vec<Vec<f64>>> = network.layers.iter().map(|_| Vec::with_capacity(count)).collect();
     for _ in 0..count {
-        for (mean, x) in means.iter_mut().zip(network.trace_f64(&random_input(network, &mut random))) {
-            for (mean, x) in mean.iter_mut().zip(x) {
-                *mean += x / count as f64;
-            }
+        for (examples, x) in examples.iter_mut().zip(network.trace_f64(&random_input(network, &mut random))) {
+            examples.push(x);
         }
     }
-    means
+    examples
 }
 
 fn measure(plan: &mut Plan, inputs: &[Vec<f32>], truths: &[Vec<f64>]) -> Deviation {

@@ -71,25 +71,6 @@ impl Format {
         }
     }
 
-    /// The bytes of `weight / scale`, little-endian, in the first `bytes()` places.
-    pub(super) fn encode(self, weight: f32, scale: f32) -> [u8; 4] {
-        let two = |bytes: [u8; 2]| [bytes[0], bytes[1], 0, 0];
-        match self {
-            Self::F32 => weight.to_le_bytes(),
-            Self::F16 => two(to_f16(weight / scale).to_le_bytes()),
-            Self::Bf16 => two(to_bf16(weight).to_le_bytes()),
-            Self::I16 => two((self.round(weight, scale) as i16).to_le_bytes()),
-            Self::I8 => [(self.round(weight, scale) as i8).cast_unsigned(), 0, 0, 0],
-        }
-    }
-
-    /// What a row's sum loses by rounding its weights to whole numbers, for these inputs; 0 for none.
-    pub(super) fn mean_loss(self, row: &[f32], inputs: &[f64]) -> f32 {
-        let scale = self.row_scale(row);
-        let lost = |weight: f32| f64::from(weight) - f64::from(scale) * f64::from(self.round(weight, scale));
-        row.iter().zip(inputs).map(|(weight, x)| lost(*weight) * x).sum::<f64>() as f32
-    }
-
     /// The whole number nearest to `weight / scale`.
     pub(super) fn round(self, weight: f32, scale: f32) -> i32 {
         (weight / scale).round_ties_even().clamp(-self.largest(), self.largest()) as i32
@@ -100,7 +81,7 @@ impl Format {
 pub(super) const LARGEST_DIGITS: f32 = 32_639.0;
 
 /// To binary16, to nearest, ties to even.
-fn to_f16(value: f32) -> u16 {
+pub(super) fn to_f16(value: f32) -> u16 {
     let bits = value.to_bits();
     let sign = (bits >> 16 & 0x8000) as u16;
     let magnitude = bits & 0x7fff_ffff;
@@ -128,7 +109,7 @@ pub(super) fn from_f16(bits: u16) -> f32 {
 }
 
 /// To the upper half of binary32, to nearest, ties to even.
-fn to_bf16(value: f32) -> u16 {
+pub(super) fn to_bf16(value: f32) -> u16 {
     let bits = value.to_bits();
     if value.is_nan() {
         return (bits >> 16) as u16 | 0x40;

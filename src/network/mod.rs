@@ -8,6 +8,7 @@ mod deviation;
 mod format;
 mod instructions;
 mod pairs;
+mod rounding;
 mod rows;
 #[cfg(target_arch = "x86_64")]
 mod tiles;
@@ -20,6 +21,7 @@ pub use instructions::InstructionSet;
 use instructions::{LANE, Lane, Line, bytes_of};
 use pairs::{Numbers, Pairs};
 use ravenpose_importer::{Activation, Dense, Network};
+use rounding::{Spread, Whole};
 use rows::{Float, Rows};
 #[cfg(target_arch = "x86_64")]
 use tiles::{Digits, Tiles};
@@ -35,8 +37,12 @@ const TILES_INPUTS_MAX: usize = 65_000;
 /// Lines of weights that one call of [`Plan::keep_warm`] reads: 8 KiB, a fraction of a microsecond.
 const WARM_LINES: usize = 128;
 
-/// Random inputs over which the mean of each layer's inputs is taken.
-const MEAN_INPUTS: usize = 64;
+/// A layer of fewer outputs takes less room as float32 in groups of four rows than as whole numbers in tiles of sixteen.
+const TILE_OUTPUTS_MIN: usize = 9;
+
+/// Random inputs from which it is learnt how each layer's inputs spread, at most; of large networks as many as can be had with this many products.
+const EXAMPLES: usize = 512;
+const EXAMPLE_PRODUCTS: usize = 300_000_000;
 
 enum Weights {
     Rows(Rows),
@@ -48,8 +54,6 @@ enum Weights {
 struct Layer {
     weights: Weights,
     bias: Box<[Lane]>,
-    /// Lanes of outputs.
-    lanes: usize,
     activation: Activation,
 }
 
@@ -104,18 +108,16 @@ impl Plan {
 
     /// Compiles a network for a given instruction set, or the widest available one below it, with weights of a given format.
     ///
-    /// With [`Format::I8`] the first and the last layer keep 16 bits: they are small, and what they lose no later layer evens out. What
-    /// rounding the weights of the others does to an average input is put right in their biases.
+    /// With [`Format::I8`] the first layer keeps 16 bits: its inputs are as unlike one another as they come. In the others, rounding makes
+    /// up for itself (`rounding.rs`). A layer of a few outputs is float32 whatever the format.
     pub fn with(network: &Network, instruction_set: InstructionSet, format: Format) -> Self {
         let instruction_set = instruction_set.available();
-        let last = network.layers.len().saturating_sub(1);
-        let means = if format == Format::I8 { deviation::mean_inputs(network, MEAN_INPUTS) } else { Vec::new() };
-        let layer = |(index, dense): (usize, &Dense)| {
-            if format == Format::I8 && index > 0 && index < last {
-                Layer::new(dense, instruction_set, format, &means[index])
-            } else {
-                Layer::new(dense, instruction_set, if format == Format::I8 { Format::I16 } else { format }, &[])
-            }
+        let count = (EXAMPLE_PRODUCTS / network.parameter_count().max(1)).min(EXAMPLES);
+        let examples = if format == Format::I8 { deviation::examples(network, count) } else { Vec::new() };
+        let layer = |(index, dense): (usize, &Dense)| match examples.get(index) {
+            Some(examples) if index > 0 => Layer::new(dense, instruction_set, format, Some(examples)),
+            Some(_) => Layer::new(dense, instruction_set, Format::I16, None),
+            None => Layer::new(dense, instruction_set, format, None),
         };
         let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
@@ -199,19 +201,18 @@ impl Plan {
             // What pads has neither shift nor scale; what was not given reads as zero.
             to.0[rest.len()..].fill(0.0);
         }
-        for lane in self.front.iter_mut().skip(whole.len() + 1) {
+        for lane in self.front[..self.shift.len()].iter_mut().skip(whole.len() + 1) {
             lane.0 = [0.0; LANE];
         }
-        for layer in &self.layers {
-            match &layer.weights {
-                Weights::Rows(rows) => rows.run(self.instruction_set, &layer.bias, &self.front, &mut self.back),
+        for Layer { weights, bias, activation } in &self.layers {
+            match weights {
+                Weights::Rows(rows) => rows.run(self.instruction_set, *activation, bias, &self.front, &mut self.back),
                 Weights::Pairs(pairs) => {
-                    pairs.run(self.instruction_set, &layer.bias, &self.front, &mut self.numbers, &mut self.back);
+                    pairs.run(self.instruction_set, *activation, bias, &self.front, &mut self.numbers, &mut self.back);
                 }
                 #[cfg(target_arch = "x86_64")]
-                Weights::Tiles(tiles) => tiles.run(&layer.bias, &self.front, &mut self.digits, &mut self.back),
+                Weights::Tiles(tiles) => tiles.run(*activation, bias, &self.front, &mut self.digits, &mut self.back),
             }
-            activation::apply(self.instruction_set, layer.activation, &mut self.back[..layer.lanes]);
             std::mem::swap(&mut self.front, &mut self.back);
         }
         for (to, from) in output.iter_mut().zip(self.front.iter().flat_map(|lane| lane.0)).take(self.output_width) {
@@ -221,35 +222,33 @@ impl Plan {
 }
 
 impl Layer {
-    /// `mean` is what goes in on average, if rounding is to be put right for it.
-    fn new(dense: &Dense, set: InstructionSet, format: Format, mean: &[f64]) -> Self {
-        let lanes = lanes(dense.outputs);
-        let kept: Vec<f32> =
-            dense.weights.iter().map(|weight| if weight.abs() < SMALLEST_WEIGHT { 0.0 } else { *weight }).collect();
-        let rows = kept.chunks_exact(dense.inputs.max(1)).zip(&dense.bias);
-        let bias: Vec<f32> = rows.map(|(row, bias)| bias + format.mean_loss(row, mean)).collect();
-        Self {
-            weights: Weights::new(&kept, dense.inputs, set, format),
-            bias: padded(&bias, lanes),
-            lanes,
-            activation: dense.activation,
-        }
+    /// `examples` are inputs for which whole numbers are rounded.
+    fn new(dense: &Dense, set: InstructionSet, format: Format, examples: Option<&Vec<Vec<f64>>>) -> Self {
+        let rows = |float| Weights::Rows(Rows::new(&dense.weights, dense.inputs, float));
+        let (weights, bias) = match format {
+            Format::F32 => (rows(Float::F32), None),
+            Format::F16 => (rows(Float::F16), None),
+            Format::Bf16 => (rows(Float::Bf16), None),
+            Format::I16 | Format::I8 if dense.outputs < TILE_OUTPUTS_MIN => (rows(Float::F32), None),
+            Format::I16 | Format::I8 => {
+                let spread = examples.map(|examples| Spread::of(examples, dense.inputs));
+                let whole = Whole::new(dense, format, spread.as_ref());
+                (Weights::whole(&whole, set), Some(whole.bias))
+            }
+        };
+        let bias = padded(bias.as_ref().unwrap_or(&dense.bias), lanes(dense.outputs));
+        Self { weights, bias, activation: dense.activation }
     }
 }
 
 impl Weights {
     #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "one layout for all that they have"))]
-    fn new(weights: &[f32], inputs: usize, set: InstructionSet, format: Format) -> Self {
-        match format {
-            Format::F32 => Self::Rows(Rows::new(weights, inputs, Float::F32)),
-            Format::F16 => Self::Rows(Rows::new(weights, inputs, Float::F16)),
-            Format::Bf16 => Self::Rows(Rows::new(weights, inputs, Float::Bf16)),
-            #[cfg(target_arch = "x86_64")]
-            Format::I16 | Format::I8 if set == InstructionSet::Avx512Vnni && inputs <= TILES_INPUTS_MAX => {
-                Self::Tiles(Tiles::new(weights, inputs, format))
-            }
-            Format::I16 | Format::I8 => Self::Pairs(Pairs::new(weights, inputs, format)),
+    fn whole(whole: &Whole, set: InstructionSet) -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if set == InstructionSet::Avx512Vnni && whole.inputs <= TILES_INPUTS_MAX {
+            return Self::Tiles(Tiles::new(whole));
         }
+        Self::Pairs(Pairs::new(whole))
     }
 
     fn lines(&self) -> &[Line] {

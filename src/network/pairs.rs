@@ -12,8 +12,11 @@ mod avx2;
 mod neon;
 mod plain;
 
-use super::format::{Format, LARGEST_DIGITS};
+use super::activation;
+use super::format::LARGEST_DIGITS;
 use super::instructions::{InstructionSet, LANE, Lane, Line};
+use super::rounding::Whole;
+use ravenpose_importer::Activation;
 
 /// Inputs of a tile.
 const DEPTH: usize = 2;
@@ -62,27 +65,25 @@ pub(super) struct Pairs {
 }
 
 impl Pairs {
-    /// Packs `weights`, row by row of `inputs` numbers, as `I8` or `I16`.
-    pub(super) fn new(weights: &[f32], inputs: usize, format: Format) -> Self {
-        let bytes = format.bytes();
-        let outputs = weights.len() / inputs.max(1);
-        let (groups, tiles) = (inputs.div_ceil(DEPTH), outputs.div_ceil(LANE));
+    /// Packs whole numbers of one or two bytes.
+    pub(super) fn new(whole: &Whole) -> Self {
+        let bytes = whole.bytes;
+        let (groups, tiles) = (whole.inputs.div_ceil(DEPTH), whole.scale.len().div_ceil(LANE));
         let mut lines = vec![Line([0; 64]); (groups * tiles * LANE * DEPTH * bytes).div_ceil(64)].into_boxed_slice();
         let (mut start, mut scale) = (super::zeros(tiles), super::zeros(tiles));
-        for (row, weights) in weights.chunks_exact(inputs.max(1)).enumerate() {
-            let row_scale = format.row_scale(weights);
+        for (row, (numbers, row_scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
             let (tile, place) = (row / LANE, row % LANE);
-            scale[tile].0[place] = if bytes == 2 { row_scale * (1 << SHIFT) as f32 } else { row_scale };
+            scale[tile].0[place] = if bytes == 2 { row_scale * (1 << SHIFT) as f32 } else { *row_scale };
             if bytes == 2 {
-                let numbers = |pair: &[f32]| pair.iter().any(|weight| format.round(*weight, row_scale) != 0);
-                start[tile].0[place] = 0.5 * weights.chunks(DEPTH).filter(|pair| numbers(pair)).count() as f32;
+                start[tile].0[place] =
+                    0.5 * numbers.chunks(DEPTH).filter(|pair| pair.iter().any(|number| *number != 0)).count() as f32;
             }
             let panel = tile / WIDTH * WIDTH;
             let side_by_side = (tiles - panel).min(WIDTH);
-            for (column, weight) in weights.iter().enumerate() {
+            for (column, number) in numbers.iter().enumerate() {
                 let block = panel * groups + column / DEPTH * side_by_side + tile - panel;
                 let at = (block * LANE * DEPTH + place * DEPTH + column % DEPTH) * bytes;
-                lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&format.encode(*weight, row_scale)[..bytes]);
+                lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&number.to_le_bytes()[..bytes]);
             }
         }
         Self { lines, groups, across: tiles, two: bytes == 2, start, scale }
@@ -92,8 +93,16 @@ impl Pairs {
         &self.lines
     }
 
-    /// `output = weights * input + bias`; `numbers` is room to work in.
-    pub(super) fn run(&self, set: InstructionSet, bias: &[Lane], input: &[Lane], numbers: &mut Numbers, output: &mut [Lane]) {
+    /// `output = activation(weights * input + bias)`; `numbers` is room to work in.
+    pub(super) fn run(
+        &self,
+        set: InstructionSet,
+        activation: Activation,
+        bias: &[Lane],
+        input: &[Lane],
+        numbers: &mut Numbers,
+        output: &mut [Lane],
+    ) {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(
             input.len() >= lanes
@@ -115,5 +124,6 @@ impl Pairs {
             InstructionSet::Neon => unsafe { neon::run(self, bias, input, numbers, output) },
             _ => plain::run(self, bias, input, numbers, output),
         }
+        activation::apply(set, activation, &mut output[..self.across]);
     }
 }

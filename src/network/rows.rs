@@ -6,8 +6,10 @@
 //! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
 //! compiled for an instruction set that was found on this machine.
 
-use super::format::{Format, from_f16};
+use super::activation;
+use super::format::{Format, from_f16, to_bf16, to_f16};
 use super::instructions::{InstructionSet, LANE, Lane, Line, bytes_of};
+use ravenpose_importer::Activation;
 
 /// Rows worked on together.
 const ROWS: usize = 4;
@@ -26,6 +28,17 @@ impl Float {
             Self::F32 => Format::F32,
             Self::F16 => Format::F16,
             Self::Bf16 => Format::Bf16,
+        }
+    }
+
+    /// The bytes of `weight / scale`, little-endian, in as many places as the format has. Weights near zero become zero.
+    fn encode(self, weight: f32, scale: f32) -> [u8; 4] {
+        let weight = if weight.abs() < super::SMALLEST_WEIGHT { 0.0 } else { weight };
+        let two = |bytes: [u8; 2]| [bytes[0], bytes[1], 0, 0];
+        match self {
+            Self::F32 => weight.to_le_bytes(),
+            Self::F16 => two(to_f16(weight / scale).to_le_bytes()),
+            Self::Bf16 => two(to_bf16(weight).to_le_bytes()),
         }
     }
 }
@@ -57,7 +70,7 @@ impl Rows {
             for (column, weight) in weights.iter().enumerate() {
                 let lane = (row / ROWS * row_lanes + column / LANE) * ROWS + row % ROWS;
                 let at = (lane * LANE + column % LANE) * bytes;
-                lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&format.encode(*weight, row_scale)[..bytes]);
+                lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&float.encode(*weight, row_scale)[..bytes]);
             }
         }
         Self { lines, row_lanes, height: rows, float, scale }
@@ -67,8 +80,8 @@ impl Rows {
         &self.lines
     }
 
-    /// `output = weights * input + bias`.
-    pub(super) fn run(&self, set: InstructionSet, bias: &[Lane], input: &[Lane], output: &mut [Lane]) {
+    /// `output = activation(weights * input + bias)`.
+    pub(super) fn run(&self, set: InstructionSet, activation: Activation, bias: &[Lane], input: &[Lane], output: &mut [Lane]) {
         let lanes = self.height.div_ceil(LANE);
         assert!(
             self.lines.len() * 64 >= self.height * self.row_lanes * LANE * self.float.format().bytes()
@@ -97,6 +110,7 @@ impl Rows {
                 *out = *out * scale + bias;
             }
         }
+        activation::apply(set, activation, out);
     }
 
     fn portable(&self, input: &[Lane], output: &mut [Lane]) {

@@ -5,7 +5,7 @@
 //! the number that each sum starts from. Of two-byte weights the product of both low digits is left out: it is zero on average and
 //! below what rounding the weights did.
 //!
-//! A tile is sixteen outputs by four inputs, one cache line per digit. Up to eight tiles that use the same inputs lie together, in the
+//! A tile is sixteen outputs by four inputs, one cache line per digit. Up to eight tiles (a panel) that use the same inputs lie together, in the
 //! order in which they are read.
 //!
 //! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
@@ -14,8 +14,11 @@
 #[allow(clippy::wildcard_imports, reason = "vector instructions")]
 use std::arch::x86_64::*;
 
-use super::format::{Format, LARGEST_DIGITS};
+use super::activation;
+use super::format::LARGEST_DIGITS;
 use super::instructions::{InstructionSet, LANE, Lane, Line};
+use super::rounding::Whole;
+use ravenpose_importer::Activation;
 
 /// Inputs of a tile.
 const DEPTH: usize = 4;
@@ -58,16 +61,15 @@ impl Digits {
         let usable = largest.is_finite() && largest >= super::SMALLEST_WEIGHT;
         self.scale = if usable { largest / LARGEST_DIGITS } else { largest * 0.0 };
         let inverse = _mm512_set1_ps(if usable { LARGEST_DIGITS / largest } else { 0.0 });
-        let offset = _mm512_set1_epi32(128);
+        // Both digits 128 too large: the two bytes of the number with as much added.
+        let offset = _mm512_set1_ps(128.0 * 257.0);
         let (high, low) = (self.high.as_mut_ptr().cast::<u8>(), self.low.as_mut_ptr().cast::<u8>());
         for (index, lane) in values.iter().enumerate() {
             // SAFETY: a lane is 64 aligned bytes; 16 bytes per lane fit into both buffers, which was checked above.
             unsafe {
-                let number = _mm512_cvtps_epi32(_mm512_mul_ps(_mm512_load_ps(lane.0.as_ptr()), inverse));
-                let top = _mm512_srai_epi32::<8>(_mm512_add_epi32(number, offset));
-                let rest = _mm512_sub_epi32(number, _mm512_slli_epi32::<8>(top));
-                _mm_store_si128(high.add(index * LANE).cast(), _mm512_cvtepi32_epi8(_mm512_add_epi32(top, offset)));
-                _mm_store_si128(low.add(index * LANE).cast(), _mm512_cvtepi32_epi8(_mm512_add_epi32(rest, offset)));
+                let number = _mm512_cvtps_epi32(_mm512_fmadd_ps(_mm512_load_ps(lane.0.as_ptr()), inverse, offset));
+                _mm_store_si128(high.add(index * LANE).cast(), _mm512_cvtepi32_epi8(_mm512_srli_epi32::<8>(number)));
+                _mm_store_si128(low.add(index * LANE).cast(), _mm512_cvtepi32_epi8(number));
             }
         }
     }
@@ -88,15 +90,13 @@ pub(super) struct Tiles {
 }
 
 impl Tiles {
-    /// Packs `weights`, row by row of `inputs` numbers, as `I8` or `I16`; only where the machine has VNNI.
-    pub(super) fn new(weights: &[f32], inputs: usize, format: Format) -> Self {
+    /// Packs whole numbers of one or two bytes; only where the machine has VNNI.
+    pub(super) fn new(whole: &Whole) -> Self {
         assert_eq!(InstructionSet::best(), InstructionSet::Avx512Vnni, "tiles are for VNNI");
-        let two = format == Format::I16;
-        let digits_per_weight = if two { 2 } else { 1 };
-        let outputs = weights.len() / inputs.max(1);
-        let (groups, tiles) = (inputs.div_ceil(DEPTH), outputs.div_ceil(LANE));
+        let two = whole.bytes == 2;
+        let (groups, tiles) = (whole.inputs.div_ceil(DEPTH), whole.scale.len().div_ceil(LANE));
         let mut packed = Self {
-            lines: vec![Line([0; 64]); groups * tiles * digits_per_weight].into_boxed_slice(),
+            lines: vec![Line([0; 64]); groups * tiles * whole.bytes].into_boxed_slice(),
             groups,
             across: tiles,
             two,
@@ -104,18 +104,15 @@ impl Tiles {
             start_mixed: vec![[0; LANE]; tiles].into_boxed_slice(),
             scale: super::zeros(tiles),
         };
-        for (row, weights) in weights.chunks_exact(inputs.max(1)).enumerate() {
-            let scale = format.row_scale(weights);
+        for (row, (numbers, scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
             let (tile, place) = (row / LANE, row % LANE);
             // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `finish` has the rest.
-            packed.scale[tile].0[place] = if two { 256.0 * scale } else { scale };
-            let panel = tile / WIDTH * WIDTH;
-            let side_by_side = (tiles - panel).min(WIDTH);
-            for (column, weight) in weights.iter().enumerate() {
-                let number = format.round(*weight, scale);
-                let line = (panel * groups + column / DEPTH * side_by_side + tile - panel) * digits_per_weight;
+            packed.scale[tile].0[place] = if two { 256.0 * scale } else { *scale };
+            let (panel, side_by_side) = panel_of(tile, tiles);
+            for (column, number) in numbers.iter().enumerate() {
+                let line = (panel * groups + column / DEPTH * side_by_side + tile - panel) * whole.bytes;
                 let byte = place * DEPTH + column % DEPTH;
-                let (high, low) = if two { digits(number) } else { (number, 0) };
+                let (high, low) = if two { digits(*number) } else { (*number, 0) };
                 packed.lines[line].0[byte] = (high as i8).cast_unsigned();
                 packed.start[tile][place] -= 128 * high;
                 packed.start_mixed[tile][place] -= 128 * (high + low);
@@ -131,80 +128,111 @@ impl Tiles {
         &self.lines
     }
 
-    /// `output = weights * input + bias`; `digits` is room to work in.
-    pub(super) fn run(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
+    /// `output = activation(weights * input + bias)`; `digits` is room to work in.
+    pub(super) fn run(&self, activation: Activation, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
         // SAFETY: `new` made sure that the machine has VNNI.
-        unsafe { self.run_vnni(bias, input, digits, output) }
+        unsafe {
+            if self.two {
+                self.panels::<true>(activation, bias, input, digits, output);
+            } else {
+                self.panels::<false>(activation, bias, input, digits, output);
+            }
+        }
     }
 
     /// # Safety
-    /// AVX-512F and VNNI must be present.
+    /// AVX-512F and VNNI must be present; `TWO` is `self.two`.
     #[target_feature(enable = "avx512f,avx512vnni")]
-    unsafe fn run_vnni(&self, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
+    unsafe fn panels<const TWO: bool>(
+        &self,
+        activation: Activation,
+        bias: &[Lane],
+        input: &[Lane],
+        digits: &mut Digits,
+        output: &mut [Lane],
+    ) {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
         let mut first = 0;
         while first < self.across {
-            let width = (self.across - first).min(WIDTH);
+            let (_, width) = panel_of(first, self.across);
             // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide.
             unsafe {
                 match width {
-                    1 => self.panel::<1>(first, bias, digits, output),
-                    2 => self.panel::<2>(first, bias, digits, output),
-                    3 => self.panel::<3>(first, bias, digits, output),
-                    4 => self.panel::<4>(first, bias, digits, output),
-                    5 => self.panel::<5>(first, bias, digits, output),
-                    6 => self.panel::<6>(first, bias, digits, output),
-                    7 => self.panel::<7>(first, bias, digits, output),
-                    _ => self.panel::<8>(first, bias, digits, output),
+                    1 => self.panel::<1, 4, TWO>(first, bias, digits, output),
+                    2 => self.panel::<2, 4, TWO>(first, bias, digits, output),
+                    3 => self.panel::<3, 2, TWO>(first, bias, digits, output),
+                    4 => self.panel::<4, 2, TWO>(first, bias, digits, output),
+                    5 => self.panel::<5, 1, TWO>(first, bias, digits, output),
+                    6 => self.panel::<6, 1, TWO>(first, bias, digits, output),
+                    7 => self.panel::<7, 1, TWO>(first, bias, digits, output),
+                    _ => self.panel::<8, 1, TWO>(first, bias, digits, output),
                 }
             }
+            // While the next panel's weights are on their way.
+            activation::apply_avx512(activation, &mut output[first..first + width]);
             first += width;
         }
     }
 
+    /// Sums of `N` tiles side by side, `DEEP` groups of inputs at a time with sums of their own: the few sums of a narrow panel would wait
+    /// for one another.
+    ///
     /// # Safety
-    /// As [`Tiles::run`], and tiles `first..first + N` must exist and lie together.
+    /// As [`Tiles::panels`], and tiles `first..first + N` must exist and lie together.
     #[target_feature(enable = "avx512f,avx512vnni")]
-    unsafe fn panel<const N: usize>(&self, first: usize, bias: &[Lane], digits: &Digits, output: &mut [Lane]) {
+    unsafe fn panel<const N: usize, const DEEP: usize, const TWO: bool>(
+        &self,
+        first: usize,
+        bias: &[Lane],
+        digits: &Digits,
+        output: &mut [Lane],
+    ) {
         let (high, low) = (digits.high.as_ptr().cast::<i32>(), digits.low.as_ptr().cast::<i32>());
         let scale = _mm512_set1_ps(digits.scale);
-        // SAFETY: `run` checked the lengths and `new` made them: `groups` words of activations, `groups * N` tiles from the panel's
+        // Words of a tile: one line per digit.
+        let words = if TWO { 32 } else { 16 };
+        let none = [[_mm512_setzero_si512(); N]; DEEP];
+        let (mut tops, mut rests, mut crossed) = (none, none, none);
+        // SAFETY: `panels` checked the lengths and `new` made them: `groups` words of activations, `groups * N` tiles from the panel's
         // first, a start and a scale for each.
         unsafe {
-            let start = |of: &[[i32; LANE]], tile: usize| _mm512_loadu_si512(of[first + tile].as_ptr().cast());
-            let mut tops: [__m512i; N] = std::array::from_fn(|tile| start(&self.start, tile));
-            let mut rests: [__m512i; N] =
-                std::array::from_fn(|tile| start(if self.two { &self.start_mixed } else { &self.start }, tile));
-            if self.two {
-                let mut w = self.lines.as_ptr().add(first * self.groups * 2).cast::<i32>();
-                for group in 0..self.groups {
-                    let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
-                    for tile in 0..N {
-                        let weight = _mm512_load_si512(w.add(tile * 32).cast());
-                        let weight_rest = _mm512_load_si512(w.add(tile * 32 + 16).cast());
-                        tops[tile] = _mm512_dpbusd_epi32(tops[tile], top, weight);
-                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], rest, weight);
-                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], top, weight_rest);
+            let mut w = self.lines.as_ptr().cast::<i32>().add(first * self.groups * words);
+            let mut add = |group: usize, deep: usize| {
+                let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
+                for tile in 0..N {
+                    let weight = _mm512_load_si512(w.add(tile * words).cast());
+                    tops[deep][tile] = _mm512_dpbusd_epi32(tops[deep][tile], top, weight);
+                    rests[deep][tile] = _mm512_dpbusd_epi32(rests[deep][tile], rest, weight);
+                    if TWO {
+                        let weight_rest = _mm512_load_si512(w.add(tile * words + 16).cast());
+                        crossed[deep][tile] = _mm512_dpbusd_epi32(crossed[deep][tile], top, weight_rest);
                     }
-                    w = w.add(N * 32);
                 }
-            } else {
-                let mut w = self.lines.as_ptr().add(first * self.groups).cast::<i32>();
-                for group in 0..self.groups {
-                    let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
-                    for tile in 0..N {
-                        let weight = _mm512_load_si512(w.add(tile * 16).cast());
-                        tops[tile] = _mm512_dpbusd_epi32(tops[tile], top, weight);
-                        rests[tile] = _mm512_dpbusd_epi32(rests[tile], rest, weight);
-                    }
-                    w = w.add(N * 16);
+                w = w.add(N * words);
+            };
+            let whole = self.groups / DEEP * DEEP;
+            let mut group = 0;
+            while group < whole {
+                for deep in 0..DEEP {
+                    add(group + deep, deep);
                 }
+                group += DEEP;
+            }
+            for group in whole..self.groups {
+                add(group, 0);
             }
             for tile in 0..N {
                 let at = first + tile;
-                let sum = _mm512_fmadd_ps(_mm512_cvtepi32_ps(tops[tile]), _mm512_set1_ps(256.0), _mm512_cvtepi32_ps(rests[tile]));
+                let start = |of: &[[i32; LANE]]| _mm512_loadu_si512(of[at].as_ptr().cast());
+                let mut top = start(&self.start);
+                let mut rest = start(if TWO { &self.start_mixed } else { &self.start });
+                for deep in 0..DEEP {
+                    top = _mm512_add_epi32(top, tops[deep][tile]);
+                    rest = _mm512_add_epi32(rest, _mm512_add_epi32(rests[deep][tile], crossed[deep][tile]));
+                }
+                let sum = _mm512_fmadd_ps(_mm512_cvtepi32_ps(top), _mm512_set1_ps(256.0), _mm512_cvtepi32_ps(rest));
                 let factor = _mm512_mul_ps(scale, _mm512_load_ps(self.scale[at].0.as_ptr()));
                 _mm512_store_ps(output[at].0.as_mut_ptr(), _mm512_fmadd_ps(sum, factor, _mm512_load_ps(bias[at].0.as_ptr())));
             }
@@ -212,9 +240,39 @@ impl Tiles {
     }
 }
 
+/// The panel that a tile of `tiles` lies in: its first tile, and how many lie side by side. As few panels as can be, as equal as can be.
+fn panel_of(tile: usize, tiles: usize) -> (usize, usize) {
+    let panels = tiles.div_ceil(WIDTH).max(1);
+    let (narrow, wider) = (tiles / panels, tiles % panels);
+    let wide = wider * (narrow + 1);
+    if tile < wide {
+        (tile / (narrow + 1) * (narrow + 1), narrow + 1)
+    } else {
+        (wide + (tile - wide) / narrow.max(1) * narrow, narrow)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::digits;
+    use super::{WIDTH, digits, panel_of};
+
+    #[test]
+    fn panels_follow_one_another_and_differ_by_one_tile_at_most() {
+        for tiles in 1..200 {
+            let (mut first, mut widths) = (0, Vec::new());
+            while first < tiles {
+                let (start, width) = panel_of(first, tiles);
+                assert!(
+                    start == first && (first..first + width).all(|tile| panel_of(tile, tiles) == (first, width)),
+                    "{tiles} {first}"
+                );
+                widths.push(width);
+                first += width;
+            }
+            let (narrowest, widest) = (widths.iter().min().unwrap_or(&0), widths.iter().max().unwrap_or(&0));
+            assert!(first == tiles && *widest <= WIDTH && widest - narrowest <= 1, "{tiles}: {widths:?}");
+        }
+    }
 
     #[test]
     fn digits_make_up_their_number() {

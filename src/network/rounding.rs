@@ -1,0 +1,177 @@
+//! Weights as whole numbers with a scale per row.
+//!
+//! Rounding each weight to the nearest number is best where inputs have nothing to do with one another. Those of an inner layer do: a few
+//! hundred of them follow a hundred features. Then what one rounding adds to a row's sum, the next one can take off again. Row by row
+//! and input by input, what has been lost so far is carried over to the inputs that are yet to be rounded, as far as they vary with those
+//! before (Babai's nearest plane; GPTQ rounds large language models so). What is left on average goes into the bias.
+
+use super::Format;
+use nalgebra::{Cholesky, DMatrix};
+use ravenpose_importer::Dense;
+
+/// Widest layer whose inputs are related to one another: the effort goes with the third power.
+const RELATED_INPUTS_MAX: usize = 1024;
+/// Variance that every input has of its own, as a share of the mean one: no number is trusted to take off everything.
+const OWN_VARIANCE: f64 = 0.05;
+
+/// How the inputs of a layer spread.
+pub(super) struct Spread {
+    mean: Vec<f64>,
+    /// Rows of the lower triangular factor of their covariance; none where they are taken for unrelated.
+    factor: Option<Vec<Vec<f64>>>,
+}
+
+impl Spread {
+    /// Of these examples, each of `inputs` numbers.
+    pub(super) fn of(examples: &[Vec<f64>], inputs: usize) -> Self {
+        let count = examples.len().max(1) as f64;
+        let mean: Vec<f64> = (0..inputs).map(|input| examples.iter().map(|example| example[input]).sum::<f64>() / count).collect();
+        let factor = || {
+            let offsets = DMatrix::from_fn(inputs, examples.len(), |input, at| examples[at][input] - mean[input]);
+            let mut covariance = &offsets * offsets.transpose() / count;
+            // What is left of inputs that never change is rounding of float64.
+            let unchanging = 1e-12 * mean.iter().map(|mean| mean * mean).sum::<f64>();
+            let own = (OWN_VARIANCE * covariance.trace() + unchanging) / inputs as f64;
+            (0..inputs).for_each(|input| covariance[(input, input)] += own);
+            let lower = Cholesky::new(covariance)?.unpack();
+            Some((0..inputs).map(|row| lower.row(row).iter().take(row + 1).copied().collect()).collect())
+        };
+        let factor = if inputs <= RELATED_INPUTS_MAX { factor() } else { None };
+        Self { mean, factor }
+    }
+}
+
+/// A layer's weights as whole numbers.
+pub(super) struct Whole {
+    /// Inputs of the layer.
+    pub(super) inputs: usize,
+    /// Bytes that a number has.
+    pub(super) bytes: usize,
+    /// Row by row.
+    pub(super) numbers: Vec<i32>,
+    /// Of each row: what a number is multiplied by to give a weight.
+    pub(super) scale: Vec<f32>,
+    /// The layer's, with what rounding loses on average.
+    pub(super) bias: Vec<f32>,
+}
+
+impl Whole {
+    /// Rounds to [`Format::I16`] or [`Format::I8`]; each weight to the nearest number where no `spread` is given.
+    pub(super) fn new(dense: &Dense, format: Format, spread: Option<&Spread>) -> Self {
+        let inputs = dense.inputs.max(1);
+        let mut whole = Self {
+            inputs,
+            bytes: format.bytes(),
+            numbers: Vec::with_capacity(dense.weights.len()),
+            scale: Vec::with_capacity(dense.outputs),
+            bias: dense.bias.clone(),
+        };
+        for (row, bias) in dense.weights.chunks_exact(inputs).zip(&mut whole.bias) {
+            let scale = format.row_scale(row);
+            match spread {
+                Some(spread) => *bias += round_together(row, format, scale, spread, &mut whole.numbers),
+                None => whole.numbers.extend(row.iter().map(|weight| format.round(*weight, scale))),
+            }
+            whole.scale.push(scale);
+        }
+        whole
+    }
+}
+
+/// Appends a row's numbers, and gives what its sums lose on average.
+fn round_together(row: &[f32], format: Format, scale: f32, spread: &Spread, numbers: &mut Vec<i32>) -> f32 {
+    let first = numbers.len();
+    numbers.resize(first + row.len(), 0);
+    // What was lost of the inputs behind, as the factor weighs it.
+    let mut owed = vec![0.0_f64; row.len()];
+    let mut lost_on_average = 0.0;
+    for (input, weight) in row.iter().enumerate().rev() {
+        let factor = spread.factor.as_ref().and_then(|factor| factor[input].split_last());
+        let carried = factor.map_or(0.0, |(own, _)| owed[input] / own);
+        let number = format.round(*weight + carried as f32, scale);
+        let lost = f64::from(*weight) - f64::from(scale) * f64::from(number);
+        if let Some((_, others)) = factor {
+            owed.iter_mut().zip(others).for_each(|(owed, other)| *owed += lost * other);
+        }
+        lost_on_average += lost * spread.mean[input];
+        numbers[first + input] = number;
+    }
+    lost_on_average as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Spread, Whole};
+    use crate::network::Format;
+    use ravenpose_importer::{Activation, Dense, Random};
+
+    const INPUTS: usize = 60;
+    const CAUSES: usize = 12;
+
+    /// Inputs that follow a few causes, around a mean.
+    fn examples(count: usize, seed: u64) -> Vec<Vec<f64>> {
+        let mut mix = Random::new(1);
+        let mix: Vec<f64> = (0..INPUTS * CAUSES).map(|_| mix.uniform() - 0.5).collect();
+        let mut random = Random::new(seed);
+        let mut example = || {
+            let causes: Vec<f64> = (0..CAUSES).map(|_| random.uniform() - 0.5).collect();
+            mix.chunks_exact(CAUSES).map(|row| 0.5 + row.iter().zip(&causes).map(|(a, b)| a * b).sum::<f64>()).collect()
+        };
+        (0..count).map(|_| example()).collect()
+    }
+
+    fn layer() -> Dense {
+        let mut random = Random::new(2);
+        let mut numbers = |count: usize| (0..count).map(|_| random.uniform() as f32 - 0.5).collect();
+        Dense { inputs: INPUTS, outputs: 40, weights: numbers(40 * INPUTS), bias: numbers(40), activation: Activation::Identity }
+    }
+
+    /// Mean and RMS of what the rounded layer's sums are off, over outputs and examples.
+    fn errors(dense: &Dense, whole: &Whole, examples: &[Vec<f64>]) -> (f64, f64) {
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+        for example in examples {
+            for row in 0..dense.outputs {
+                let at = row * INPUTS..(row + 1) * INPUTS;
+                let truth: f64 = dense.weights[at.clone()].iter().zip(example).map(|(w, x)| f64::from(*w) * x).sum();
+                let found: f64 = whole.numbers[at].iter().zip(example).map(|(n, x)| f64::from(*n) * x).sum();
+                let off = found * f64::from(whole.scale[row]) + f64::from(whole.bias[row]) - truth - f64::from(dense.bias[row]);
+                (sum, squares, count) = (sum + off, squares + off * off, count + 1.0);
+            }
+        }
+        (sum / count, (squares / count).sqrt())
+    }
+
+    #[test]
+    fn related_inputs_take_off_what_rounding_does_also_where_they_were_not_seen() {
+        let dense = layer();
+        let spread = Spread::of(&examples(500, 3), INPUTS);
+        let unseen = examples(500, 4);
+        let (_, nearest) = errors(&dense, &Whole::new(&dense, Format::I8, None), &unseen);
+        let (mean, together) = errors(&dense, &Whole::new(&dense, Format::I8, Some(&spread)), &unseen);
+        assert!(together < 0.3 * nearest, "{together:e} instead of {nearest:e}");
+        assert!(mean.abs() < 0.2 * together, "{mean:e} is left on average of {together:e}");
+    }
+
+    #[test]
+    fn numbers_stay_in_range_and_near_their_weights() {
+        let dense = layer();
+        let whole = Whole::new(&dense, Format::I8, Some(&Spread::of(&examples(500, 3), INPUTS)));
+        for (row, scale) in whole.scale.iter().enumerate() {
+            for at in row * INPUTS..(row + 1) * INPUTS {
+                assert!(whole.numbers[at].abs() <= 127);
+                let steps = (dense.weights[at] / scale - whole.numbers[at] as f32).abs();
+                assert!(steps < 8.0, "a weight moved by {steps} steps");
+            }
+        }
+    }
+
+    #[test]
+    fn inputs_that_never_change_are_taken_for_unrelated() {
+        let dense = layer();
+        let spread = Spread::of(&vec![vec![0.7; INPUTS]; 50], INPUTS);
+        let whole = Whole::new(&dense, Format::I8, Some(&spread));
+        assert_eq!(whole.numbers, Whole::new(&dense, Format::I8, None).numbers);
+        let (mean, rms) = errors(&dense, &whole, &[vec![0.7; INPUTS]]);
+        assert!(mean.abs() < 1e-6 && rms < 1e-6, "{mean:e} {rms:e}");
+    }
+}
