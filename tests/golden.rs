@@ -123,7 +123,7 @@ fn bound_mm(format: Format) -> f64 {
         Format::I16 => 1e-3,
         Format::F16 => 4e-3,
         Format::Bf16 => 0.04,
-        Format::I8 => 0.2,
+        Format::I8 => 0.03,
     }
 }
 
