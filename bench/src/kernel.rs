@@ -15,8 +15,8 @@ const WARM_UP: usize = 500;
 const INPUTS: usize = 64;
 /// What a first answer may be off, mm: formats differ, networks more.
 const SAME_MM: f64 = 0.2;
-/// Runs between sleeps, and with flushed weights, per engine and round.
-const SLOW_ROUNDS: usize = 3;
+/// Rounds between sleeps, and with flushed weights: short ones, since the machine is in another mood every few seconds.
+const SLOW_ROUNDS: usize = 9;
 
 /// Sums the bytes of the weights as words: the least that any evaluation must read. Eight accumulators, like the kernel.
 #[inline(never)]
@@ -193,10 +193,11 @@ pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> 
         return Ok(tables);
     }
 
-    for _ in 0..SLOW_ROUNDS {
-        for contender in &mut contenders {
+    for round in 0..SLOW_ROUNDS {
+        for turn in 0..contenders.len() {
+            let at = (turn + round) % contenders.len();
             let mut next = now_ns();
-            sink += contender.round(50, runs / 8, |_| {
+            sink += contenders[at].round(20, runs / 24, |_| {
                 next = (next + 1_000_000).max(now_ns());
                 sleep_until_ns(next);
             });
@@ -205,9 +206,10 @@ pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> 
     tables.push(table("The same once a millisecond, asleep between", &mut contenders));
 
     contenders.retain(|contender| contender.engine.flush());
-    for _ in 0..SLOW_ROUNDS {
-        for contender in &mut contenders {
-            sink += contender.round(5, runs / 40, |engine| {
+    for round in 0..SLOW_ROUNDS {
+        for turn in 0..contenders.len() {
+            let at = (turn + round) % contenders.len();
+            sink += contenders[at].round(5, runs / 120, |engine| {
                 engine.flush();
             });
         }
