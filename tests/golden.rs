@@ -99,6 +99,25 @@ fn nan_and_infinity_in_an_input_reach_the_output_of_every_kernel() {
 }
 
 #[test]
+fn nothing_of_a_run_with_nan_is_left_in_the_next_whatever_the_widths() {
+    let mut rng = common::Rng(9);
+    // Narrow layers whose padding lies where a wider one wrote before, in either of the two buffers.
+    for widths in [&[118, 20, 40, 50, 44, 3][..], &[118, 40, 20, 44, 50, 3], &[118, 3, 40, 3, 50, 3], &[118, 200, 130, 250, 180, 3]] {
+        let network = Network::dense(widths, Activation::Tanh, |_, inputs| (rng.uniform() - 0.5) as f32 / (inputs as f32).sqrt());
+        for mut plan in every_plan(&network) {
+            let run = |plan: &mut Plan, value: f32| {
+                let mut output = [0.0_f32; 3];
+                plan.run(&[value; 118], &mut output);
+                output
+            };
+            let before = run(&mut plan, 0.7);
+            assert!(run(&mut plan, f32::NAN).iter().all(|value| value.is_nan()), "{widths:?}: {}", name(&plan));
+            assert_eq!(run(&mut plan, 0.7), before, "{widths:?}: {}", name(&plan));
+        }
+    }
+}
+
+#[test]
 fn denormals_change_nothing() {
     let network = model::network(&common::untrained()).expect("the repository's model");
     let run = |plan: &mut Plan, value: f32| {
