@@ -1,7 +1,7 @@
 //! Which weight format is exact enough for a network: measured against float64 when it is loaded, never in the loop.
 
 use super::{Format, InstructionSet, Plan};
-use ravenpose_importer::{Network, Random};
+use ravenpose_importer::{Dense, Network, Random};
 use std::fmt;
 use thiserror::Error;
 
@@ -73,14 +73,17 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     Err(last.unwrap_or(NotExactEnough { format: Format::F32, worst: f64::NAN, limit }))
 }
 
-/// What goes into each layer, layer by layer, over as many random inputs as are asked for: others than those that deviations are
-/// measured on.
-pub(super) fn examples(network: &Network, count: usize) -> Vec<Vec<Vec<f64>>> {
+/// What goes into each layer that is `wanted`, layer by layer, over as many random inputs as are asked for: others than those that
+/// deviations are measured on.
+pub(super) fn examples(network: &Network, count: usize, wanted: impl Fn((usize, &Dense)) -> bool) -> Vec<Vec<Vec<f64>>> {
     let mut random = Random::new(0x00CA_11B0);
-    let mut examples: Vec<Vec<Vec<f64>>> = network.layers.iter().map(|_| Vec::with_capacity(count)).collect();
+    let mut examples: Vec<Vec<Vec<f64>>> = network.layers.iter().map(|_| Vec::new()).collect();
     for _ in 0..count {
-        for (examples, x) in examples.iter_mut().zip(network.trace_f64(&random_input(network, &mut random))) {
-            examples.push(x);
+        let trace = network.trace_f64(&random_input(network, &mut random));
+        for ((layer, examples), x) in network.layers.iter().enumerate().zip(&mut examples).zip(trace) {
+            if wanted(layer) {
+                examples.push(x);
+            }
         }
     }
     examples

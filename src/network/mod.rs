@@ -37,12 +37,9 @@ const TILES_INPUTS_MAX: usize = 65_000;
 /// Lines of weights that one call of [`Plan::keep_warm`] reads: 8 KiB, a fraction of a microsecond.
 const WARM_LINES: usize = 128;
 
-/// A layer of fewer outputs takes less room as float32 in groups of four rows than as whole numbers in tiles of sixteen.
+/// A layer of fewer outputs takes no more room as float32 in groups of four rows than as numbers of 16 bits in a tile of sixteen, and loses
+/// nothing.
 const TILE_OUTPUTS_MIN: usize = 9;
-
-/// Random inputs from which it is learnt how each layer's inputs spread, at most; of large networks as many as can be had with this many products.
-const EXAMPLES: usize = 512;
-const EXAMPLE_PRODUCTS: usize = 300_000_000;
 
 enum Weights {
     Rows(Rows),
@@ -112,16 +109,14 @@ impl Plan {
     /// up for itself (`rounding.rs`). A layer of a few outputs is float32 whatever the format.
     pub fn with(network: &Network, instruction_set: InstructionSet, format: Format) -> Self {
         let instruction_set = instruction_set.available();
-        let count = (EXAMPLE_PRODUCTS / network.parameter_count().max(1)).min(EXAMPLES);
-        let examples = if format == Format::I8 { deviation::examples(network, count) } else { Vec::new() };
-        let layer = |(index, dense): (usize, &Dense)| match examples.get(index) {
-            Some(examples) if index > 0 => Layer::new(dense, instruction_set, format, Some(examples)),
-            Some(_) => Layer::new(dense, instruction_set, Format::I16, None),
-            None => Layer::new(dense, instruction_set, format, None),
+        let mut spreads = if format == Format::I8 { rounding::spreads(network) } else { Vec::new() }.into_iter();
+        let layer = |dense: &Dense| match (format, spreads.next().flatten()) {
+            (Format::I8, None) => Layer::new(dense, instruction_set, Format::I16, None),
+            (_, spread) => Layer::new(dense, instruction_set, format, spread.as_ref()),
         };
         let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
-        let layers = network.layers.iter().enumerate().map(layer).collect();
+        let layers = network.layers.iter().map(layer).collect();
         let input_lanes = lanes(network.input_width);
         let ones = vec![1.0; network.input_width];
         let (shift, scale) = network.input_scale.as_ref().map_or_else(
@@ -222,8 +217,8 @@ impl Plan {
 }
 
 impl Layer {
-    /// `examples` are inputs for which whole numbers are rounded.
-    fn new(dense: &Dense, set: InstructionSet, format: Format, examples: Option<&Vec<Vec<f64>>>) -> Self {
+    /// `spread` is that of the inputs for which whole numbers are rounded.
+    fn new(dense: &Dense, set: InstructionSet, format: Format, spread: Option<&Spread>) -> Self {
         let rows = |float| Weights::Rows(Rows::new(&dense.weights, dense.inputs, float));
         let (weights, bias) = match format {
             Format::F32 => (rows(Float::F32), None),
@@ -231,8 +226,7 @@ impl Layer {
             Format::Bf16 => (rows(Float::Bf16), None),
             Format::I16 | Format::I8 if dense.outputs < TILE_OUTPUTS_MIN => (rows(Float::F32), None),
             Format::I16 | Format::I8 => {
-                let spread = examples.map(|examples| Spread::of(examples, dense.inputs));
-                let whole = Whole::new(dense, format, spread.as_ref());
+                let whole = Whole::new(dense, format, spread);
                 (Weights::whole(&whole, set), Some(whole.bias))
             }
         };

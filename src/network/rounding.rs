@@ -5,14 +5,38 @@
 //! and input by input, what has been lost so far is carried over to the inputs that are yet to be rounded, as far as they vary with those
 //! before (Babai's nearest plane; GPTQ rounds large language models so). What is left on average goes into the bias.
 
-use super::Format;
+use super::{Format, TILE_OUTPUTS_MIN, deviation};
 use nalgebra::{Cholesky, DMatrix};
-use ravenpose_importer::Dense;
+use ravenpose_importer::{Dense, Network};
 
-/// Widest layer whose inputs are related to one another: the effort goes with the third power.
-const RELATED_INPUTS_MAX: usize = 1024;
 /// Variance that every input has of its own, as a share of the mean one: no number is trusted to take off everything.
 const OWN_VARIANCE: f64 = 0.05;
+/// Random inputs from which it is learnt how each layer's inputs spread, at most; of large networks as many as can be had with so many
+/// products and so many numbers kept, so that a start stays one of seconds and of some 100 MB.
+const EXAMPLES: usize = 512;
+const EXAMPLE_PRODUCTS: usize = 300_000_000;
+const EXAMPLE_NUMBERS: usize = 8_000_000;
+/// Networks whose rounding takes more products than this in all (a second or two) are rounded as if inputs were not related.
+const RELATED_PRODUCTS: f64 = 3e9;
+
+/// For each layer how its inputs spread; none for the first, and for those of too few outputs for whole numbers.
+pub(super) fn spreads(network: &Network) -> Vec<Option<Spread>> {
+    let inner = |(index, layer): (usize, &Dense)| index > 0 && layer.outputs >= TILE_OUTPUTS_MIN;
+    let layers = || network.layers.iter().enumerate().filter(|numbered| inner(*numbered)).map(|(_, layer)| layer);
+    let kept: usize = layers().map(|layer| layer.inputs).sum();
+    let count = EXAMPLES.min(EXAMPLE_PRODUCTS / network.parameter_count().max(1)).min(EXAMPLE_NUMBERS / kept.max(1));
+    // Covariance, its factor, and what is carried over in each row.
+    let products = |layer: &Dense| {
+        let [inputs, outputs] = [layer.inputs, layer.outputs].map(|width| width as f64);
+        inputs * inputs * (count as f64 + inputs / 3.0 + outputs / 2.0)
+    };
+    let related = layers().map(products).sum::<f64>() <= RELATED_PRODUCTS;
+    let examples = deviation::examples(network, count, inner);
+    let spread = |(numbered, examples): ((usize, &Dense), Vec<Vec<f64>>)| {
+        inner(numbered).then(|| Spread::of(&examples, numbered.1.inputs, related))
+    };
+    network.layers.iter().enumerate().zip(examples).map(spread).collect()
+}
 
 /// How the inputs of a layer spread.
 pub(super) struct Spread {
@@ -22,8 +46,8 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// Of these examples, each of `inputs` numbers.
-    pub(super) fn of(examples: &[Vec<f64>], inputs: usize) -> Self {
+    /// Of these examples, each of `inputs` numbers, which are `related` to one another or not.
+    fn of(examples: &[Vec<f64>], inputs: usize, related: bool) -> Self {
         let count = examples.len().max(1) as f64;
         let mean: Vec<f64> = (0..inputs).map(|input| examples.iter().map(|example| example[input]).sum::<f64>() / count).collect();
         let factor = || {
@@ -36,7 +60,7 @@ impl Spread {
             let lower = Cholesky::new(covariance)?.unpack();
             Some((0..inputs).map(|row| lower.row(row).iter().take(row + 1).copied().collect()).collect())
         };
-        let factor = if inputs <= RELATED_INPUTS_MAX { factor() } else { None };
+        let factor = if related { factor() } else { None };
         Self { mean, factor }
     }
 }
@@ -103,7 +127,7 @@ fn round_together(row: &[f32], format: Format, scale: f32, spread: &Spread, numb
 mod tests {
     use super::{Spread, Whole};
     use crate::network::Format;
-    use ravenpose_importer::{Activation, Dense, Random};
+    use ravenpose_importer::{Activation, Dense, Network, Random};
 
     const INPUTS: usize = 60;
     const CAUSES: usize = 12;
@@ -144,7 +168,7 @@ mod tests {
     #[test]
     fn related_inputs_take_off_what_rounding_does_also_where_they_were_not_seen() {
         let dense = layer();
-        let spread = Spread::of(&examples(500, 3), INPUTS);
+        let spread = Spread::of(&examples(500, 3), INPUTS, true);
         let unseen = examples(500, 4);
         let (_, nearest) = errors(&dense, &Whole::new(&dense, Format::I8, None), &unseen);
         let (mean, together) = errors(&dense, &Whole::new(&dense, Format::I8, Some(&spread)), &unseen);
@@ -155,7 +179,7 @@ mod tests {
     #[test]
     fn numbers_stay_in_range_and_near_their_weights() {
         let dense = layer();
-        let whole = Whole::new(&dense, Format::I8, Some(&Spread::of(&examples(500, 3), INPUTS)));
+        let whole = Whole::new(&dense, Format::I8, Some(&Spread::of(&examples(500, 3), INPUTS, true)));
         for (row, scale) in whole.scale.iter().enumerate() {
             for at in row * INPUTS..(row + 1) * INPUTS {
                 assert!(whole.numbers[at].abs() <= 127);
@@ -168,10 +192,22 @@ mod tests {
     #[test]
     fn inputs_that_never_change_are_taken_for_unrelated() {
         let dense = layer();
-        let spread = Spread::of(&vec![vec![0.7; INPUTS]; 50], INPUTS);
+        let spread = Spread::of(&vec![vec![0.7; INPUTS]; 50], INPUTS, true);
         let whole = Whole::new(&dense, Format::I8, Some(&spread));
         assert_eq!(whole.numbers, Whole::new(&dense, Format::I8, None).numbers);
         let (mean, rms) = errors(&dense, &whole, &[vec![0.7; INPUTS]]);
         assert!(mean.abs() < 1e-6 && rms < 1e-6, "{mean:e} {rms:e}");
+    }
+
+    #[test]
+    fn what_is_too_large_is_rounded_without_relations_and_from_few_examples() {
+        let spreads =
+            |widths: &[usize]| super::spreads(&Network::dense(widths, Activation::Tanh, |place, _| (place % 7) as f32 * 1e-3));
+        let factors = |widths: &[usize]| -> Vec<Option<bool>> {
+            spreads(widths).iter().map(|spread| spread.as_ref().map(|spread| spread.factor.is_some())).collect()
+        };
+        assert_eq!(factors(&[118, 40, 30, 3]), [None, Some(true), None]);
+        // A covariance of 3000 by 3000 takes 9e9 products to take apart.
+        assert_eq!(factors(&[10, 3000, 9, 3]), [None, Some(false), None]);
     }
 }

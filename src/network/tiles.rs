@@ -106,7 +106,7 @@ impl Tiles {
         };
         for (row, (numbers, scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
             let (tile, place) = (row / LANE, row % LANE);
-            // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `finish` has the rest.
+            // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `panel` has the rest.
             packed.scale[tile].0[place] = if two { 256.0 * scale } else { *scale };
             let (panel, side_by_side) = panel_of(tile, tiles);
             for (column, number) in numbers.iter().enumerate() {
