@@ -182,41 +182,36 @@ pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> 
     let mut sink = 0.0_f32;
     let mut tables = vec![deviations(&network)];
 
-    for round in 0..ROUNDS {
-        for turn in 0..contenders.len() {
-            let at = (turn + round) % contenders.len();
-            sink += contenders[at].round(WARM_UP, runs, |_| ());
-        }
-    }
+    sink += in_turn(&mut contenders, ROUNDS, |contender| contender.round(WARM_UP, runs, |_| ()));
     tables.push(table("Network 118-600-500-400-3, one thread, tight loop, us", &mut contenders));
     if tight_only {
         return Ok(tables);
     }
 
-    for round in 0..SLOW_ROUNDS {
-        for turn in 0..contenders.len() {
-            let at = (turn + round) % contenders.len();
-            let mut next = now_ns();
-            sink += contenders[at].round(20, runs / 24, |_| {
-                next = (next + 1_000_000).max(now_ns());
-                sleep_until_ns(next);
-            });
-        }
-    }
+    sink += in_turn(&mut contenders, SLOW_ROUNDS, |contender| {
+        let mut next = now_ns();
+        contender.round(20, runs / 24, |_| {
+            next = (next + 1_000_000).max(now_ns());
+            sleep_until_ns(next);
+        })
+    });
     tables.push(table("The same once a millisecond, asleep between", &mut contenders));
 
     contenders.retain(|contender| contender.engine.flush());
-    for round in 0..SLOW_ROUNDS {
-        for turn in 0..contenders.len() {
-            let at = (turn + round) % contenders.len();
-            sink += contenders[at].round(5, runs / 120, |engine| {
-                engine.flush();
-            });
-        }
-    }
+    sink += in_turn(&mut contenders, SLOW_ROUNDS, |contender| {
+        contender.round(5, runs / 120, |engine| {
+            engine.flush();
+        })
+    });
     tables.push(table("The same with the weights flushed from every cache", &mut contenders));
     std::hint::black_box(sink);
     Ok(tables)
+}
+
+/// All of them round after round, each time another one first.
+fn in_turn(contenders: &mut [Contender], rounds: usize, mut one: impl FnMut(&mut Contender) -> f32) -> f32 {
+    let count = contenders.len();
+    (0..rounds).flat_map(|round| (0..count).map(move |turn| (turn + round) % count)).map(|at| one(&mut contenders[at])).sum()
 }
 
 fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected) -> Result<Vec<Contender>, String> {

@@ -55,7 +55,7 @@ impl Format {
     }
 
     /// Largest whole number of an integer format. That of 16 bits splits into two balanced digits of 8 bits.
-    pub(super) fn largest(self) -> f32 {
+    fn largest(self) -> f32 {
         if self == Self::I8 { 127.0 } else { LARGEST_DIGITS }
     }
 

@@ -95,6 +95,7 @@ impl Tiles {
         assert_eq!(InstructionSet::best(), InstructionSet::Avx512Vnni, "tiles are for VNNI");
         let two = whole.bytes == 2;
         let (groups, tiles) = (whole.inputs.div_ceil(DEPTH), whole.scale.len().div_ceil(LANE));
+        let panel_of: Vec<_> = panels(tiles).flat_map(|panel| std::iter::repeat_n(panel, panel.1)).collect();
         let mut packed = Self {
             lines: vec![Line([0; 64]); groups * tiles * whole.bytes].into_boxed_slice(),
             groups,
@@ -108,7 +109,7 @@ impl Tiles {
             let (tile, place) = (row / LANE, row % LANE);
             // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `panel` has the rest.
             packed.scale[tile].0[place] = if two { 256.0 * scale } else { *scale };
-            let (panel, side_by_side) = panel_of(tile, tiles);
+            let (panel, side_by_side) = panel_of[tile];
             for (column, number) in numbers.iter().enumerate() {
                 let line = (panel * groups + column / DEPTH * side_by_side + tile - panel) * whole.bytes;
                 let byte = place * DEPTH + column % DEPTH;
@@ -154,9 +155,7 @@ impl Tiles {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
-        let mut first = 0;
-        while first < self.across {
-            let (_, width) = panel_of(first, self.across);
+        for (first, width) in panels(self.across) {
             // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide.
             unsafe {
                 match width {
@@ -172,7 +171,6 @@ impl Tiles {
             }
             // While the next panel's weights are on their way.
             activation::apply_avx512(activation, &mut output[first..first + width]);
-            first += width;
         }
     }
 
@@ -240,32 +238,23 @@ impl Tiles {
     }
 }
 
-/// The panel that a tile of `tiles` lies in: its first tile, and how many lie side by side. As few panels as can be, as equal as can be.
-fn panel_of(tile: usize, tiles: usize) -> (usize, usize) {
-    let panels = tiles.div_ceil(WIDTH).max(1);
-    let (narrow, wider) = (tiles / panels, tiles % panels);
-    let wide = wider * (narrow + 1);
-    if tile < wide {
-        (tile / (narrow + 1) * (narrow + 1), narrow + 1)
-    } else {
-        (wide + (tile - wide) / narrow.max(1) * narrow, narrow)
-    }
+/// The panels of so many tiles: first tile, and how many lie side by side. As few panels as can be, as equal as can be.
+fn panels(tiles: usize) -> impl Iterator<Item = (usize, usize)> {
+    let count = tiles.div_ceil(WIDTH);
+    let (narrow, wider) = (tiles / count.max(1), tiles % count.max(1));
+    (0..count).map(move |panel| (panel * narrow + panel.min(wider), narrow + usize::from(panel < wider)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{WIDTH, digits, panel_of};
+    use super::{WIDTH, digits, panels};
 
     #[test]
     fn panels_follow_one_another_and_differ_by_one_tile_at_most() {
         for tiles in 1..200 {
             let (mut first, mut widths) = (0, Vec::new());
-            while first < tiles {
-                let (start, width) = panel_of(first, tiles);
-                assert!(
-                    start == first && (first..first + width).all(|tile| panel_of(tile, tiles) == (first, width)),
-                    "{tiles} {first}"
-                );
+            for (start, width) in panels(tiles) {
+                assert!(start == first && width > 0, "{tiles} {first}");
                 widths.push(width);
                 first += width;
             }
