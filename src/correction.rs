@@ -121,6 +121,7 @@ pub trait Estimator {
 }
 
 /// A model as the cycle uses it.
+#[derive(Clone)]
 pub struct Model<E> {
     /// The network.
     pub estimator: E,

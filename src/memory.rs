@@ -15,6 +15,7 @@ pub use ravenpose_importer::Play;
 /// (`raven2-plant.toml`: 2500/2730 A times 0.0603 N m/A over 2.847e-4/12.25 kg m^2, through 135). Two periods of the slowest controller.
 const UNSEEN_NS: i64 = 20_000_000;
 
+#[derive(Clone)]
 struct Held {
     input: usize,
     half_width: f32,
@@ -51,6 +52,7 @@ impl Held {
 }
 
 /// The plays of one arm. Float32 throughout, as the file's own graph computes them.
+#[derive(Clone)]
 pub struct Memory {
     plays: Box<[Held]>,
     /// Time of the state that was followed last, ns.

@@ -130,6 +130,7 @@ impl Loaded {
 }
 
 /// A network as the loop runs it: its memory of the recent motion, the plan, and what watches the load meanwhile.
+#[derive(Clone)]
 pub struct Estimate {
     plan: Plan,
     memory: Memory,

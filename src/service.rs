@@ -4,7 +4,7 @@ use crate::config::{Config, ModelSource, Wait};
 use crate::correction::ArmModel;
 use crate::cycle::{ArmModels, Cycle};
 use crate::histogram::{self, Histograms};
-use crate::model::{self, Estimate};
+use crate::model::{self, Estimate, Loaded, ModelError};
 use crate::realtime::{self, Missing};
 use crate::runner::{Ended, Runner, TestHook, Waiting};
 use crate::shared::{self, EventSender, Shared};
@@ -157,16 +157,38 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::f
     realtime::hold_cpu_dma_latency().map_err(|problem| missing.push(problem)).ok()
 }
 
+type ModelResult = Result<Loaded, ModelError>;
+
+/// Each model once, however many arms it is for, and all at the same time: a service that was killed is to be back soon.
+fn load_files(config: &Config) -> Result<Vec<(&ModelSource, ModelResult)>, String> {
+    let mut sources: Vec<&ModelSource> = Vec::new();
+    for source in config.models.iter().flatten().flat_map(|arm| std::iter::once(&arm.position).chain(&arm.orientation)) {
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    std::thread::scope(|scope| {
+        let start = |source| std::thread::Builder::new().spawn_scoped(scope, move || model::load(source));
+        let loading: Vec<_> = sources.iter().map(|source| start(*source)).collect();
+        let loaded = sources.iter().zip(loading).map(|(source, thread)| {
+            let thread = thread.map_err(|cause| format!("no thread can be started ({cause}); raise TasksMax= of the unit"))?;
+            Ok((*source, thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
+        });
+        loaded.collect()
+    })
+}
+
 fn load_models(config: &Config) -> Result<Prepared, String> {
+    let files = load_files(config)?;
     let mut names = [String::new(), String::new()];
     let none = || ArmModels::from(ArmModel::None);
     let mut models = [none(), none()];
     for arm in 0..ARMS {
         let Some(sources) = &config.models[arm] else { continue };
-        let (model, name) = load_model(config, &sources.position, NAMES[arm])?;
+        let (model, name) = load_model(config, &files, &sources.position, NAMES[arm])?;
         (models[arm].position, names[arm]) = (model, name);
         if let Some(source) = &sources.orientation {
-            let (model, name) = load_model(config, source, &format!("orientation of the {}", NAMES[arm]))?;
+            let (model, name) = load_model(config, &files, source, &format!("orientation of the {}", NAMES[arm]))?;
             models[arm].orientation = model;
             names[arm] = format!("{}; orientation {name}", names[arm]);
         }
@@ -178,8 +200,14 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
 }
 
 /// A model, and how statistics show it; `whose` arm is for the log.
-fn load_model(config: &Config, source: &ModelSource, whose: &str) -> Result<(ArmModel<Estimate>, String), String> {
-    match model::load(source) {
+fn load_model(
+    config: &Config,
+    files: &[(&ModelSource, ModelResult)],
+    source: &ModelSource,
+    whose: &str,
+) -> Result<(ArmModel<Estimate>, String), String> {
+    let file = files.iter().find(|(of, _)| *of == source).map(|(_, result)| result);
+    match file.ok_or_else(|| format!("{whose} arm: its model was not loaded"))? {
         Ok(loaded) => {
             let weights = loaded.weights();
             let name = format!("{:016x} {}, {weights}", loaded.model.id, source.path.display());
@@ -190,7 +218,7 @@ fn load_model(config: &Config, source: &ModelSource, whose: &str) -> Result<(Arm
             } else if card.untrained {
                 say(&format!("{whose} arm: the model is untrained; every pose will be fallback(untrained)"));
             }
-            Ok((ArmModel::Loaded(Box::new(loaded.model)), name))
+            Ok((ArmModel::Loaded(Box::new(loaded.model.clone())), name))
         }
         Err(error) if config.allow_degraded => {
             say(&format!("{whose} arm: {error}; going on without it, as allow_degraded says"));

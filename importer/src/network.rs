@@ -110,22 +110,18 @@ impl Network {
     ///
     /// If `input` does not have `input_width` numbers.
     pub fn evaluate_f64(&self, input: &[f32]) -> Vec<f64> {
-        self.trace_f64(input).pop().unwrap_or_default()
+        let evaluate = |x: Vec<f64>, layer: &Dense| layer.evaluate_f64(&x);
+        self.layers.iter().fold(self.scaled_f64(input), evaluate)
     }
 
-    /// What goes into each layer, in order, and last what comes out; in double precision.
+    /// An input as the first layer gets it, in double precision.
     ///
     /// # Panics
     ///
     /// If `input` does not have `input_width` numbers.
-    pub fn trace_f64(&self, input: &[f32]) -> Vec<Vec<f64>> {
+    pub fn scaled_f64(&self, input: &[f32]) -> Vec<f64> {
         assert_eq!(input.len(), self.input_width, "length of the input vector");
-        let mut trace = vec![scaled_f64(self.input_scale.as_ref(), input)];
-        for layer in &self.layers {
-            let next = layer.evaluate_f64(&trace[trace.len() - 1]);
-            trace.push(next);
-        }
-        trace
+        scaled_f64(self.input_scale.as_ref(), input)
     }
 
     /// The raw input that the network's own scaling turns into `z`; `z` itself where it has none.

@@ -1,7 +1,8 @@
 //! Which weight format is exact enough for a network: measured against float64 when it is loaded, never in the loop.
 
 use super::{Format, InstructionSet, Plan};
-use ravenpose_importer::{Dense, Network, Random};
+use nalgebra::DMatrix;
+use ravenpose_importer::{Network, Random};
 use std::fmt;
 use thiserror::Error;
 
@@ -58,7 +59,7 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     let mut random = Random::new(0x0005_EED0_F0DD);
     let mut inputs: Vec<Vec<f32>> = golden.to_vec();
     inputs.extend((0..RANDOM_INPUTS).map(|_| random_input(network, &mut random)));
-    let truths: Vec<Vec<f64>> = inputs.iter().map(|input| network.evaluate_f64(input)).collect();
+    let truths = evaluate(network, &inputs, |_, _| ());
     let candidates = asked.as_ref().map_or(&CANDIDATES[..], std::slice::from_ref);
     let mut last = None;
     for &format in candidates {
@@ -73,28 +74,37 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     Err(last.unwrap_or(NotExactEnough { format: Format::F32, worst: f64::NAN, limit }))
 }
 
-/// What goes into each layer that is `wanted`, layer by layer, over as many random inputs as are asked for: others than those that
+/// Shows what goes into each layer, one column per input, over as many random inputs as are asked for: others than those that
 /// deviations are measured on.
-pub(super) fn examples(network: &Network, count: usize, wanted: impl Fn((usize, &Dense)) -> bool) -> Vec<Vec<Vec<f64>>> {
+pub(super) fn show_examples(network: &Network, count: usize, see: impl FnMut(usize, &DMatrix<f64>)) {
     let mut random = Random::new(0x00CA_11B0);
-    let mut examples: Vec<Vec<Vec<f64>>> = network.layers.iter().map(|_| Vec::new()).collect();
-    for _ in 0..count {
-        let trace = network.trace_f64(&random_input(network, &mut random));
-        for ((layer, examples), x) in network.layers.iter().enumerate().zip(&mut examples).zip(trace) {
-            if wanted(layer) {
-                examples.push(x);
+    let inputs: Vec<Vec<f32>> = (0..count).map(|_| random_input(network, &mut random)).collect();
+    evaluate(network, &inputs, see);
+}
+
+/// As [`Network::evaluate_f64`] does, but all inputs at once, one column each: a service that was killed is to be back soon.
+fn evaluate(network: &Network, inputs: &[Vec<f32>], mut see: impl FnMut(usize, &DMatrix<f64>)) -> DMatrix<f64> {
+    let scaled = inputs.iter().flat_map(|input| network.scaled_f64(input));
+    let mut x = DMatrix::from_iterator(network.input_width, inputs.len(), scaled);
+    for (index, layer) in network.layers.iter().enumerate() {
+        see(index, &x);
+        let weights = layer.weights.iter().map(|weight| f64::from(*weight));
+        x = DMatrix::from_row_iterator(layer.outputs, layer.inputs, weights) * x;
+        for mut column in x.column_iter_mut() {
+            for (y, bias) in column.iter_mut().zip(&layer.bias) {
+                *y = layer.activation.apply_f64(*y + f64::from(*bias));
             }
         }
     }
-    examples
+    x
 }
 
-fn measure(plan: &mut Plan, inputs: &[Vec<f32>], truths: &[Vec<f64>]) -> Deviation {
+fn measure(plan: &mut Plan, inputs: &[Vec<f32>], truths: &DMatrix<f64>) -> Deviation {
     let (mut worst, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
     let mut output = vec![0.0_f32; plan.output_width()];
-    for (input, truth) in inputs.iter().zip(truths) {
+    for (input, truth) in inputs.iter().zip(truths.column_iter()) {
         plan.run(input, &mut output);
-        for (found, truth) in output.iter().zip(truth) {
+        for (found, truth) in output.iter().zip(truth.iter()) {
             let difference = (f64::from(*found) - truth).abs();
             // `max` would forget NaN.
             worst = if difference.is_nan() { f64::INFINITY } else { worst.max(difference) };
@@ -112,4 +122,28 @@ fn normal(random: &mut Random) -> f64 {
 
 fn random_input(network: &Network, random: &mut Random) -> Vec<f32> {
     (0..network.input_width).map(|index| network.raw_input(index, normal(random))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Network, Random, evaluate, random_input};
+    use ravenpose_importer::Activation;
+
+    #[test]
+    fn all_inputs_at_once_give_what_each_gives() {
+        let mut random = Random::new(1);
+        let mut network = Network::dense(&[30, 90, 70, 3], Activation::Sigmoid, |_, inputs| {
+            (random.uniform() as f32 - 0.5) * 9.0 / inputs as f32
+        });
+        network.layers.iter_mut().flat_map(|layer| &mut layer.bias).for_each(|bias| *bias = random.uniform() as f32);
+        let inputs: Vec<Vec<f32>> = (0..40).map(|_| random_input(&network, &mut random)).collect();
+        let mut widths = Vec::new();
+        let found = evaluate(&network, &inputs, |index, x| widths.push((index, x.shape())));
+        assert_eq!(widths, [(0, (30, 40)), (1, (90, 40)), (2, (70, 40))]);
+        for (input, found) in inputs.iter().zip(found.column_iter()) {
+            for (truth, found) in network.evaluate_f64(input).iter().zip(found.iter()) {
+                assert!((truth - found).abs() < 1e-13 * truth.abs().max(1.0), "{found} instead of {truth}");
+            }
+        }
+    }
 }

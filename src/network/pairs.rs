@@ -30,6 +30,7 @@ const BLOCK: usize = 256;
 const SHIFT: i32 = 8;
 
 /// Activations as whole numbers of two bytes, for [`Pairs::run`].
+#[derive(Clone)]
 pub(super) struct Numbers {
     lines: Box<[Line]>,
     scale: f32,

@@ -6,7 +6,7 @@
 //! before (Babai's nearest plane; GPTQ rounds large language models so). What is left on average goes into the bias.
 
 use super::{Format, TILE_OUTPUTS_MIN, deviation};
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use ravenpose_importer::{Dense, Network};
 
 /// Variance that every input has of its own, as a share of the mean one: no number is trusted to take off everything.
@@ -23,38 +23,39 @@ const RELATED_PRODUCTS: f64 = 3e9;
 pub(super) fn spreads(network: &Network) -> Vec<Option<Spread>> {
     let inner = |(index, layer): (usize, &Dense)| index > 0 && layer.outputs >= TILE_OUTPUTS_MIN;
     let layers = || network.layers.iter().enumerate().filter(|numbered| inner(*numbered)).map(|(_, layer)| layer);
-    let kept: usize = layers().map(|layer| layer.inputs).sum();
-    let count = EXAMPLES.min(EXAMPLE_PRODUCTS / network.parameter_count().max(1)).min(EXAMPLE_NUMBERS / kept.max(1));
+    let widest = layers().map(|layer| layer.inputs).max().unwrap_or(1);
+    let count = EXAMPLES.min(EXAMPLE_PRODUCTS / network.parameter_count().max(1)).min(EXAMPLE_NUMBERS / widest).max(1);
     // Covariance, its factor, and what is carried over in each row.
     let products = |layer: &Dense| {
         let [inputs, outputs] = [layer.inputs, layer.outputs].map(|width| width as f64);
         inputs * inputs * (count as f64 + inputs / 3.0 + outputs / 2.0)
     };
     let related = layers().map(products).sum::<f64>() <= RELATED_PRODUCTS;
-    let examples = deviation::examples(network, count, inner);
-    let spread = |(numbered, examples): ((usize, &Dense), Vec<Vec<f64>>)| {
-        inner(numbered).then(|| Spread::of(&examples, numbered.1.inputs, related))
-    };
-    network.layers.iter().enumerate().zip(examples).map(spread).collect()
+    let mut spreads = Vec::with_capacity(network.layers.len());
+    deviation::show_examples(network, count, |index, x| {
+        spreads.push(inner((index, &network.layers[index])).then(|| Spread::of(x, related)));
+    });
+    spreads
 }
 
 /// How the inputs of a layer spread.
 pub(super) struct Spread {
-    mean: Vec<f64>,
+    mean: DVector<f64>,
     /// Rows of the lower triangular factor of their covariance; none where they are taken for unrelated.
     factor: Option<Vec<Vec<f64>>>,
 }
 
 impl Spread {
-    /// Of these examples, each of `inputs` numbers, which are `related` to one another or not.
-    fn of(examples: &[Vec<f64>], inputs: usize, related: bool) -> Self {
-        let count = examples.len().max(1) as f64;
-        let mean: Vec<f64> = (0..inputs).map(|input| examples.iter().map(|example| example[input]).sum::<f64>() / count).collect();
+    /// Of these examples, one in each column, whose numbers are `related` to one another or not.
+    fn of(examples: &DMatrix<f64>, related: bool) -> Self {
+        let (inputs, count) = examples.shape();
+        let mean = examples.column_mean();
         let factor = || {
-            let offsets = DMatrix::from_fn(inputs, examples.len(), |input, at| examples[at][input] - mean[input]);
-            let mut covariance = &offsets * offsets.transpose() / count;
+            let mut offsets = examples.clone();
+            offsets.column_iter_mut().for_each(|mut column| column -= &mean);
+            let mut covariance = &offsets * offsets.transpose() / count as f64;
             // What is left of inputs that never change is rounding of float64.
-            let unchanging = 1e-12 * mean.iter().map(|mean| mean * mean).sum::<f64>();
+            let unchanging = 1e-12 * mean.norm_squared();
             let own = (OWN_VARIANCE * covariance.trace() + unchanging) / inputs as f64;
             (0..inputs).for_each(|input| covariance[(input, input)] += own);
             let lower = Cholesky::new(covariance)?.unpack();
@@ -125,23 +126,26 @@ fn round_together(row: &[f32], format: Format, scale: f32, spread: &Spread, numb
 
 #[cfg(test)]
 mod tests {
-    use super::{Spread, Whole};
+    use super::{DMatrix, DVector, Spread, Whole};
     use crate::network::Format;
     use ravenpose_importer::{Activation, Dense, Network, Random};
 
     const INPUTS: usize = 60;
     const CAUSES: usize = 12;
 
-    /// Inputs that follow a few causes, around a mean.
-    fn examples(count: usize, seed: u64) -> Vec<Vec<f64>> {
+    /// Inputs that follow a few causes, around a mean; one example in each column.
+    fn examples(count: usize, seed: u64) -> DMatrix<f64> {
         let mut mix = Random::new(1);
         let mix: Vec<f64> = (0..INPUTS * CAUSES).map(|_| mix.uniform() - 0.5).collect();
         let mut random = Random::new(seed);
-        let mut example = || {
+        let mut example = || -> DVector<f64> {
             let causes: Vec<f64> = (0..CAUSES).map(|_| random.uniform() - 0.5).collect();
-            mix.chunks_exact(CAUSES).map(|row| 0.5 + row.iter().zip(&causes).map(|(a, b)| a * b).sum::<f64>()).collect()
+            mix.chunks_exact(CAUSES)
+                .map(|row| 0.5 + row.iter().zip(&causes).map(|(a, b)| a * b).sum::<f64>())
+                .collect::<Vec<_>>()
+                .into()
         };
-        (0..count).map(|_| example()).collect()
+        DMatrix::from_columns(&(0..count).map(|_| example()).collect::<Vec<_>>())
     }
 
     fn layer() -> Dense {
@@ -151,13 +155,13 @@ mod tests {
     }
 
     /// Mean and RMS of what the rounded layer's sums are off, over outputs and examples.
-    fn errors(dense: &Dense, whole: &Whole, examples: &[Vec<f64>]) -> (f64, f64) {
+    fn errors(dense: &Dense, whole: &Whole, examples: &DMatrix<f64>) -> (f64, f64) {
         let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
-        for example in examples {
+        for example in examples.column_iter() {
             for row in 0..dense.outputs {
                 let at = row * INPUTS..(row + 1) * INPUTS;
-                let truth: f64 = dense.weights[at.clone()].iter().zip(example).map(|(w, x)| f64::from(*w) * x).sum();
-                let found: f64 = whole.numbers[at].iter().zip(example).map(|(n, x)| f64::from(*n) * x).sum();
+                let truth: f64 = dense.weights[at.clone()].iter().zip(example.iter()).map(|(w, x)| f64::from(*w) * x).sum();
+                let found: f64 = whole.numbers[at].iter().zip(example.iter()).map(|(n, x)| f64::from(*n) * x).sum();
                 let off = found * f64::from(whole.scale[row]) + f64::from(whole.bias[row]) - truth - f64::from(dense.bias[row]);
                 (sum, squares, count) = (sum + off, squares + off * off, count + 1.0);
             }
@@ -168,7 +172,7 @@ mod tests {
     #[test]
     fn related_inputs_take_off_what_rounding_does_also_where_they_were_not_seen() {
         let dense = layer();
-        let spread = Spread::of(&examples(500, 3), INPUTS, true);
+        let spread = Spread::of(&examples(500, 3), true);
         let unseen = examples(500, 4);
         let (_, nearest) = errors(&dense, &Whole::new(&dense, Format::I8, None), &unseen);
         let (mean, together) = errors(&dense, &Whole::new(&dense, Format::I8, Some(&spread)), &unseen);
@@ -179,7 +183,7 @@ mod tests {
     #[test]
     fn numbers_stay_in_range_and_near_their_weights() {
         let dense = layer();
-        let whole = Whole::new(&dense, Format::I8, Some(&Spread::of(&examples(500, 3), INPUTS, true)));
+        let whole = Whole::new(&dense, Format::I8, Some(&Spread::of(&examples(500, 3), true)));
         for (row, scale) in whole.scale.iter().enumerate() {
             for at in row * INPUTS..(row + 1) * INPUTS {
                 assert!(whole.numbers[at].abs() <= 127);
@@ -192,10 +196,10 @@ mod tests {
     #[test]
     fn inputs_that_never_change_are_taken_for_unrelated() {
         let dense = layer();
-        let spread = Spread::of(&vec![vec![0.7; INPUTS]; 50], INPUTS, true);
+        let spread = Spread::of(&DMatrix::repeat(INPUTS, 50, 0.7), true);
         let whole = Whole::new(&dense, Format::I8, Some(&spread));
         assert_eq!(whole.numbers, Whole::new(&dense, Format::I8, None).numbers);
-        let (mean, rms) = errors(&dense, &whole, &[vec![0.7; INPUTS]]);
+        let (mean, rms) = errors(&dense, &whole, &DMatrix::repeat(INPUTS, 1, 0.7));
         assert!(mean.abs() < 1e-6 && rms < 1e-6, "{mean:e} {rms:e}");
     }
 

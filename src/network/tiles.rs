@@ -32,6 +32,7 @@ fn digits(number: i32) -> (i32, i32) {
 }
 
 /// Activations as digits, for [`Tiles::run`].
+#[derive(Clone)]
 pub(super) struct Digits {
     high: Box<[Line]>,
     low: Box<[Line]>,
