@@ -159,7 +159,8 @@ fn prepare_machine(config: &Config, missing: &mut Vec<Missing>) -> Option<std::f
 
 type ModelResult = Result<Loaded, ModelError>;
 
-/// Each model once, however many arms it is for, and all at the same time: a service that was killed is to be back soon.
+/// Each model once, however many arms it is for, and all at the same time, the first by this thread: a service that was killed is to be
+/// back soon.
 fn load_files(config: &Config) -> Result<Vec<(&ModelSource, ModelResult)>, String> {
     let mut sources: Vec<&ModelSource> = Vec::new();
     for source in config.models.iter().flatten().flat_map(|arm| std::iter::once(&arm.position).chain(&arm.orientation)) {
@@ -167,14 +168,16 @@ fn load_files(config: &Config) -> Result<Vec<(&ModelSource, ModelResult)>, Strin
             sources.push(source);
         }
     }
+    let Some((first, others)) = sources.split_first() else { return Ok(Vec::new()) };
     std::thread::scope(|scope| {
         let start = |source| std::thread::Builder::new().spawn_scoped(scope, move || model::load(source));
-        let loading: Vec<_> = sources.iter().map(|source| start(*source)).collect();
-        let loaded = sources.iter().zip(loading).map(|(source, thread)| {
+        let loading: Vec<_> = others.iter().map(|source| start(*source)).collect();
+        let mut loaded = vec![(*first, model::load(first))];
+        for (source, thread) in others.iter().zip(loading) {
             let thread = thread.map_err(|cause| format!("no thread can be started ({cause}); raise TasksMax= of the unit"))?;
-            Ok((*source, thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
-        });
-        loaded.collect()
+            loaded.push((*source, thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))));
+        }
+        Ok(loaded)
     })
 }
 

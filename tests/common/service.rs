@@ -34,11 +34,12 @@ impl World {
         Self { dir, settings }
     }
 
-    /// A configuration with the untrained model on both arms, allowed; `more` is put in front.
+    /// A configuration with the untrained model on both arms, in the format that is chosen for it, without the time that the choice takes;
+    /// `more` is put in front.
     pub fn config(&self, more: &str) -> PathBuf {
         let model = untrained();
         let text = format!(
-            "{more}\n[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[gold]\nmodel = \"{}\"\n[green]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\nhistogram_dir = \"{}\"\ninterval_s = 1\n",
+            "{more}\n[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[gold]\nmodel = \"{}\"\nweights = \"i16\"\n[green]\nmodel = \"{}\"\nweights = \"i16\"\n[report]\nruntime_dir = \"{}\"\nhistogram_dir = \"{}\"\ninterval_s = 1\n",
             self.settings.prefix,
             self.settings.root,
             model.display(),
