@@ -369,7 +369,7 @@ impl<'a> Table<'a> {
     /// `None` is the free choice, stated or not.
     fn weights(&mut self, key: &'static str) -> Result<Option<Format>, ConfigError> {
         let format = |text: &str| if text == "auto" { Some(None) } else { text.parse().ok().map(Some) };
-        let wanted = "\"auto\", \"f32\", \"f16\", \"bf16\", \"i16\" or \"i8\"";
+        let wanted = "\"auto\", \"f32\", \"f16\", \"bf16\", \"i16\", \"i12\" or \"i8\"";
         Ok(self.take(key, wanted, |value| value.as_str().and_then(format))?.flatten())
     }
 

@@ -117,7 +117,7 @@ const WRONG_VALUE: [(&str, &str); 27] = [
     ("[gold]", ":1:1: gold.model is missing; add model = \"FILE.onnx\" to [gold]"),
     (
         "[gold]\nmodel = \"a.onnx\"\nweights = \"int8\"",
-        ":3:11: gold.weights = \"int8\" must be \"auto\", \"f32\", \"f16\", \"bf16\", \"i16\" or \"i8\"",
+        ":3:11: gold.weights = \"int8\" must be \"auto\", \"f32\", \"f16\", \"bf16\", \"i16\", \"i12\" or \"i8\"",
     ),
     (
         "[gold]\nmodel = \"a.onnx\"\nweights_deviation_um = 0",

@@ -219,7 +219,7 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
     let mut all = Vec::new();
     let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
     // What is stored in as many bytes has one floor.
-    for formats in [&[Format::F32][..], &[Format::F16, Format::I16], &[Format::I8]] {
+    for formats in [&[Format::F32][..], &[Format::F16, Format::I16], &[Format::I12], &[Format::I8]] {
         let floor = all.len();
         let read = Plan::with(network, InstructionSet::best(), formats[0]);
         let title = format!("floor: read {:.2} MB once", read.bytes() as f64 / 1e6);

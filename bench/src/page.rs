@@ -16,7 +16,7 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
-- *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
+- *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16, i12 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
 - *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last three
   rows are processes of their own, one after the other: compare them with one another.

@@ -1,15 +1,16 @@
 //! Which weight format is exact enough for a network: measured against float64 when it is loaded, never in the loop.
 
-use super::{Format, InstructionSet, Plan};
+use super::{Format, InstructionSet, Plan, rounding};
 use nalgebra::DMatrix;
 use ravenpose_importer::{Network, Random};
+use std::cell::OnceCell;
 use std::fmt;
 use thiserror::Error;
 
 /// Random inputs beside the golden ones.
 pub const RANDOM_INPUTS: usize = 256;
 /// Formats that a free choice tries, smallest first. Of those with 16 bits the one with the least error.
-const CANDIDATES: [Format; 3] = [Format::I8, Format::I16, Format::F32];
+const CANDIDATES: [Format; 4] = [Format::I8, Format::I12, Format::I16, Format::F32];
 
 /// How far a plan's outputs are from float64's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,9 +62,11 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     inputs.extend((0..RANDOM_INPUTS).map(|_| random_input(network, &mut random)));
     let truths = evaluate(network, &inputs, |_, _| ());
     let candidates = asked.as_ref().map_or(&CANDIDATES[..], std::slice::from_ref);
-    let mut last = None;
+    let (mut last, spreads) = (None, OnceCell::new());
     for &format in candidates {
-        let mut plan = Plan::with(network, InstructionSet::best(), format);
+        // The same for each format that wants them.
+        let spreads: &[_] = if format.is_rounded_together() { spreads.get_or_init(|| rounding::spreads(network)) } else { &[] };
+        let mut plan = Plan::rounded(network, InstructionSet::best(), format, spreads);
         let deviation = measure(&mut plan, &inputs, &truths);
         // Written so that NaN fails.
         if deviation.worst <= limit || format == Format::F32 {

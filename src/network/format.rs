@@ -13,13 +13,15 @@ pub enum Format {
     Bf16,
     /// Whole numbers of 16 bits with a scale per row.
     I16,
+    /// Whole numbers of 12 bits with a scale per row.
+    I12,
     /// Whole numbers of 8 bits with a scale per row.
     I8,
 }
 
 /// A word that names no format.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{0:?} is not a weight format; use f32, f16, bf16, i16 or i8")]
+#[error("{0:?} is not a weight format; use f32, f16, bf16, i16, i12 or i8")]
 pub struct UnknownFormat(String);
 
 impl std::str::FromStr for Format {
@@ -32,7 +34,7 @@ impl std::str::FromStr for Format {
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 5] = [Self::F32, Self::F16, Self::Bf16, Self::I16, Self::I8];
+    pub const ALL: [Self; 6] = [Self::F32, Self::F16, Self::Bf16, Self::I16, Self::I12, Self::I8];
 
     /// Name in configurations and reports.
     pub fn name(self) -> &'static str {
@@ -41,22 +43,41 @@ impl Format {
             Self::F16 => "f16",
             Self::Bf16 => "bf16",
             Self::I16 => "i16",
+            Self::I12 => "i12",
             Self::I8 => "i8",
         }
     }
 
-    /// Bytes of one weight.
+    /// Bytes of one weight; those of 12 bits are packed closer where the kernel can.
     pub fn bytes(self) -> usize {
         match self {
             Self::F32 => 4,
-            Self::F16 | Self::Bf16 | Self::I16 => 2,
+            Self::F16 | Self::Bf16 | Self::I16 | Self::I12 => 2,
             Self::I8 => 1,
         }
     }
 
-    /// Largest whole number of an integer format. That of 16 bits splits into two balanced digits of 8 bits.
+    /// Largest whole number of an integer format: its balanced digits, the high one of 8 bits, the low one of what is left, still fit.
     fn largest(self) -> f32 {
-        if self == Self::I8 { 127.0 } else { LARGEST_DIGITS }
+        match self {
+            Self::I8 => 127.0,
+            Self::I12 => 2039.0,
+            _ => LARGEST_DIGITS,
+        }
+    }
+
+    /// Is each number rounded with regard to the others of its row? With 16 bits there is nothing to gain.
+    pub(super) fn is_rounded_together(self) -> bool {
+        matches!(self, Self::I12 | Self::I8)
+    }
+
+    /// What a layer takes in this one's place if its roundings cannot make up for one another.
+    pub(super) fn unrelated(self) -> Self {
+        match self {
+            Self::I8 => Self::I12,
+            Self::I12 => Self::I16,
+            other => other,
+        }
     }
 
     /// What a stored number of this row is multiplied by to give the weight.
@@ -67,7 +88,7 @@ impl Format {
             _ if largest < super::SMALLEST_WEIGHT => 1.0,
             // Largest number between 2^14 and 2^15: half of what binary16 holds.
             Self::F16 => (largest.log2().floor() - 14.0).exp2(),
-            Self::I16 | Self::I8 => largest / self.largest(),
+            Self::I16 | Self::I12 | Self::I8 => largest / self.largest(),
         }
     }
 

@@ -108,18 +108,23 @@ impl Plan {
 
     /// Compiles a network for a given instruction set, or the widest available one below it, with weights of a given format.
     ///
-    /// With [`Format::I8`] the first layer keeps 16 bits: its inputs are as unlike one another as they come. In the others, rounding makes
-    /// up for itself (`rounding.rs`). A layer of a few outputs is float32 whatever the format.
+    /// With [`Format::I8`] and [`Format::I12`] the first layer keeps four bits more: its inputs are as unlike one another as they come. In
+    /// the others, rounding makes up for itself (`rounding.rs`). A layer of a few outputs is float32 whatever the whole numbers.
     pub fn with(network: &Network, instruction_set: InstructionSet, format: Format) -> Self {
+        let spreads = if format.is_rounded_together() { rounding::spreads(network) } else { Vec::new() };
+        Self::rounded(network, instruction_set, format, &spreads)
+    }
+
+    /// As [`Plan::with`], with the spreads of the layers' inputs if the format is rounded together.
+    fn rounded(network: &Network, instruction_set: InstructionSet, format: Format, spreads: &[Option<Spread>]) -> Self {
         let instruction_set = instruction_set.available();
-        let mut spreads = if format == Format::I8 { rounding::spreads(network) } else { Vec::new() }.into_iter();
-        let layer = |dense: &Dense| match (format, spreads.next().flatten()) {
-            (Format::I8, None) => Layer::new(dense, instruction_set, Format::I16, None),
-            (_, spread) => Layer::new(dense, instruction_set, format, spread.as_ref()),
+        let layer = |(index, dense): (usize, &Dense)| match spreads.get(index).and_then(Option::as_ref) {
+            None => Layer::new(dense, instruction_set, format.unrelated(), None),
+            spread => Layer::new(dense, instruction_set, format, spread),
         };
         let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
-        let layers = network.layers.iter().map(layer).collect();
+        let layers = network.layers.iter().enumerate().map(layer).collect();
         let input_lanes = lanes(network.input_width);
         let ones = vec![1.0; network.input_width];
         let (shift, scale) = network.input_scale.as_ref().map_or_else(
@@ -227,8 +232,8 @@ impl Layer {
             Format::F32 => (rows(Float::F32), None),
             Format::F16 => (rows(Float::F16), None),
             Format::Bf16 => (rows(Float::Bf16), None),
-            Format::I16 | Format::I8 if dense.outputs < TILE_OUTPUTS_MIN => (rows(Float::F32), None),
-            Format::I16 | Format::I8 => {
+            Format::I16 | Format::I12 | Format::I8 if dense.outputs < TILE_OUTPUTS_MIN => (rows(Float::F32), None),
+            Format::I16 | Format::I12 | Format::I8 => {
                 let whole = Whole::new(dense, format, spread);
                 (Weights::whole(&whole, set), Some(whole.bias))
             }

@@ -68,7 +68,7 @@ pub(super) struct Pairs {
 impl Pairs {
     /// Packs whole numbers of one or two bytes.
     pub(super) fn new(whole: &Whole) -> Self {
-        let bytes = whole.bytes;
+        let bytes = whole.format.bytes();
         let (groups, tiles) = (whole.inputs.div_ceil(DEPTH), whole.scale.len().div_ceil(LANE));
         let mut lines = vec![Line([0; 64]); (groups * tiles * LANE * DEPTH * bytes).div_ceil(64)].into_boxed_slice();
         let (mut start, mut scale) = (super::zeros(tiles), super::zeros(tiles));

@@ -70,8 +70,8 @@ impl Spread {
 pub(super) struct Whole {
     /// Inputs of the layer.
     pub(super) inputs: usize,
-    /// Bytes that a number has.
-    pub(super) bytes: usize,
+    /// Of the numbers.
+    pub(super) format: Format,
     /// Row by row.
     pub(super) numbers: Vec<i32>,
     /// Of each row: what a number is multiplied by to give a weight.
@@ -81,12 +81,12 @@ pub(super) struct Whole {
 }
 
 impl Whole {
-    /// Rounds to [`Format::I16`] or [`Format::I8`]; each weight to the nearest number where no `spread` is given.
+    /// Rounds to a format of whole numbers; each weight to the nearest number where no `spread` is given.
     pub(super) fn new(dense: &Dense, format: Format, spread: Option<&Spread>) -> Self {
         let inputs = dense.inputs.max(1);
         let mut whole = Self {
             inputs,
-            bytes: format.bytes(),
+            format,
             numbers: Vec::with_capacity(dense.weights.len()),
             scale: Vec::with_capacity(dense.outputs),
             bias: dense.bias.clone(),

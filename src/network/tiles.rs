@@ -1,12 +1,12 @@
-//! Matrix times vector in whole numbers: weights of one or two signed bytes, activations of two, exact sums by VNNI.
+//! Matrix times vector in whole numbers: weights of one byte, of one and a half or of two, activations of two, exact sums by VNNI.
 //!
 //! Activations become `scale * (256 * high + low)` with one scale for the whole vector; `high` and `low` are stored as unsigned bytes,
 //! 128 too large, as the instruction wants one unsigned operand. What the 128 adds to a sum, it adds for every input alike: it is in
-//! the number that each sum starts from. Of two-byte weights the product of both low digits is left out: it is zero on average and
-//! below what rounding the weights did.
+//! the number that each sum starts from. Weights that are larger have a second digit, of eight bits or of four; the product of both low
+//! digits is left out: it is zero on average and below what rounding the weights did.
 //!
-//! A tile is sixteen outputs by four inputs, one cache line per digit. Up to eight tiles (a panel) that use the same inputs lie together, in the
-//! order in which they are read.
+//! A tile is sixteen outputs by four inputs: a cache line of high digits, and one of low digits, or half of one that it shares with its
+//! neighbour. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.
 //!
 //! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
 //! compiled for an instruction set that was found on this machine.
@@ -15,7 +15,7 @@
 use std::arch::x86_64::*;
 
 use super::activation;
-use super::format::LARGEST_DIGITS;
+use super::format::{Format, LARGEST_DIGITS};
 use super::instructions::{InstructionSet, LANE, Lane, Line};
 use super::rounding::Whole;
 use ravenpose_importer::Activation;
@@ -25,10 +25,24 @@ const DEPTH: usize = 4;
 /// Most tiles side by side.
 const WIDTH: usize = 8;
 
-/// `number = 256 * high + low` with both digits in [-128, 127].
-fn digits(number: i32) -> (i32, i32) {
-    let high = (number + 128) >> 8;
-    (high, number - (high << 8))
+/// Bits of the low digit of weights of 16 bits, of 12, and of 8, which have none.
+const BYTE: u32 = 8;
+const NIBBLE: u32 = 4;
+const NONE: u32 = 0;
+
+/// `number = 2^bits * high + low`, with a low digit of so many bits, balanced around zero.
+fn digits(number: i32, bits: u32) -> (i32, i32) {
+    let high = (number + ((1 << bits) >> 1)) >> bits;
+    (high, number - (high << bits))
+}
+
+/// Lines of one group of inputs in a panel so wide.
+const fn lines_per_group(width: usize, low: u32) -> usize {
+    match low {
+        NONE => width,
+        NIBBLE => width + width.div_ceil(2),
+        _ => 2 * width,
+    }
 }
 
 /// Activations as digits, for [`Tiles::run`].
@@ -83,43 +97,61 @@ pub(super) struct Tiles {
     groups: usize,
     /// Tiles side by side in the whole layer.
     across: usize,
-    two: bool,
-    /// What each sum starts from, by output: with the weights' only or high digit, and with the low one added for two.
+    /// Bits of the weights' low digit.
+    low: u32,
+    /// What each sum starts from, by output: that of high digits alone, and that where activations or weights have the low one.
     start: Box<[[i32; LANE]]>,
     start_mixed: Box<[[i32; LANE]]>,
     scale: Box<[Lane]>,
 }
 
 impl Tiles {
-    /// Packs whole numbers of one or two bytes; only where the machine has VNNI.
+    /// Packs whole numbers; only where the machine has VNNI.
     pub(super) fn new(whole: &Whole) -> Self {
         assert_eq!(InstructionSet::best(), InstructionSet::Avx512Vnni, "tiles are for VNNI");
-        let two = whole.bytes == 2;
+        let low = match whole.format {
+            Format::I8 => NONE,
+            Format::I12 => NIBBLE,
+            _ => BYTE,
+        };
         let (groups, tiles) = (whole.inputs.div_ceil(DEPTH), whole.scale.len().div_ceil(LANE));
-        let panel_of: Vec<_> = panels(tiles).flat_map(|panel| std::iter::repeat_n(panel, panel.1)).collect();
+        // Of each tile: its panel's first tile and width, and the line where that begins.
+        let mut panel_of = Vec::with_capacity(tiles);
+        let mut lines = 0;
+        for (first, width) in panels(tiles) {
+            panel_of.extend(std::iter::repeat_n((first, width, lines), width));
+            lines += groups * lines_per_group(width, low);
+        }
         let mut packed = Self {
-            lines: vec![Line([0; 64]); groups * tiles * whole.bytes].into_boxed_slice(),
+            lines: vec![Line([0; 64]); lines].into_boxed_slice(),
             groups,
             across: tiles,
-            two,
+            low,
             start: vec![[0; LANE]; tiles].into_boxed_slice(),
             start_mixed: vec![[0; LANE]; tiles].into_boxed_slice(),
             scale: super::zeros(tiles),
         };
         for (row, (numbers, scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
             let (tile, place) = (row / LANE, row % LANE);
-            // A step of the sum of high digits is 256 steps of the weights, or 1 where there is one digit; `panel` has the rest.
-            packed.scale[tile].0[place] = if two { 256.0 * scale } else { *scale };
-            let (panel, side_by_side) = panel_of[tile];
+            // A step of the high digit is so many steps of the weights; `panel` has the rest.
+            packed.scale[tile].0[place] = (1_u32 << low) as f32 * scale;
+            let (panel, side_by_side, begin) = panel_of[tile];
+            let in_panel = tile - panel;
             for (column, number) in numbers.iter().enumerate() {
-                let line = (panel * groups + column / DEPTH * side_by_side + tile - panel) * whole.bytes;
+                let group = begin + column / DEPTH * lines_per_group(side_by_side, low);
                 let byte = place * DEPTH + column % DEPTH;
-                let (high, low) = if two { digits(*number) } else { (*number, 0) };
-                packed.lines[line].0[byte] = (high as i8).cast_unsigned();
+                let (high, rest) = digits(*number, low);
+                packed.lines[group + in_panel].0[byte] = (high as i8).cast_unsigned();
                 packed.start[tile][place] -= 128 * high;
-                packed.start_mixed[tile][place] -= 128 * (high + low);
-                if two {
-                    packed.lines[line + 1].0[byte] = (low as i8).cast_unsigned();
+                // In the upper bits of a byte, which has a sign: times as much as makes a step of its product one of `rests`.
+                let rest = rest << (BYTE - low);
+                packed.start_mixed[tile][place] -= 128 * (high + rest);
+                let (rest, lows) = ((rest as i8).cast_unsigned(), group + side_by_side);
+                match low {
+                    NONE => {}
+                    // Of two neighbours the first has the upper half of the byte.
+                    NIBBLE => packed.lines[lows + in_panel / 2].0[byte] |= rest >> (in_panel % 2 * NIBBLE as usize),
+                    _ => packed.lines[lows + in_panel].0[byte] = rest,
                 }
             }
         }
@@ -134,18 +166,18 @@ impl Tiles {
     pub(super) fn run(&self, activation: Activation, bias: &[Lane], input: &[Lane], digits: &mut Digits, output: &mut [Lane]) {
         // SAFETY: `new` made sure that the machine has VNNI.
         unsafe {
-            if self.two {
-                self.panels::<true>(activation, bias, input, digits, output);
-            } else {
-                self.panels::<false>(activation, bias, input, digits, output);
+            match self.low {
+                NONE => self.panels::<NONE>(activation, bias, input, digits, output),
+                NIBBLE => self.panels::<NIBBLE>(activation, bias, input, digits, output),
+                _ => self.panels::<BYTE>(activation, bias, input, digits, output),
             }
         }
     }
 
     /// # Safety
-    /// AVX-512F and VNNI must be present; `TWO` is `self.two`.
+    /// AVX-512F and VNNI must be present; `LOW` is `self.low`.
     #[target_feature(enable = "avx512f,avx512vnni")]
-    unsafe fn panels<const TWO: bool>(
+    unsafe fn panels<const LOW: u32>(
         &self,
         activation: Activation,
         bias: &[Lane],
@@ -156,18 +188,21 @@ impl Tiles {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
+        let mut lines = &*self.lines;
         for (first, width) in panels(self.across) {
-            // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide.
+            let (panel, behind) = lines.split_at(self.groups * lines_per_group(width, LOW));
+            lines = behind;
+            // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide, and these are its lines.
             unsafe {
                 match width {
-                    1 => self.panel::<1, 4, TWO>(first, bias, digits, output),
-                    2 => self.panel::<2, 4, TWO>(first, bias, digits, output),
-                    3 => self.panel::<3, 2, TWO>(first, bias, digits, output),
-                    4 => self.panel::<4, 2, TWO>(first, bias, digits, output),
-                    5 => self.panel::<5, 1, TWO>(first, bias, digits, output),
-                    6 => self.panel::<6, 1, TWO>(first, bias, digits, output),
-                    7 => self.panel::<7, 1, TWO>(first, bias, digits, output),
-                    _ => self.panel::<8, 1, TWO>(first, bias, digits, output),
+                    1 => self.panel::<1, 4, LOW>(panel, first, bias, digits, output),
+                    2 => self.panel::<2, 4, LOW>(panel, first, bias, digits, output),
+                    3 => self.panel::<3, 2, LOW>(panel, first, bias, digits, output),
+                    4 => self.panel::<4, 2, LOW>(panel, first, bias, digits, output),
+                    5 => self.panel::<5, 1, LOW>(panel, first, bias, digits, output),
+                    6 => self.panel::<6, 1, LOW>(panel, first, bias, digits, output),
+                    7 => self.panel::<7, 1, LOW>(panel, first, bias, digits, output),
+                    _ => self.panel::<8, 1, LOW>(panel, first, bias, digits, output),
                 }
             }
             // While the next panel's weights are on their way.
@@ -179,10 +214,11 @@ impl Tiles {
     /// for one another.
     ///
     /// # Safety
-    /// As [`Tiles::panels`], and tiles `first..first + N` must exist and lie together.
+    /// As [`Tiles::panels`], and tiles `first..first + N` must exist and be the panel of these `lines`.
     #[target_feature(enable = "avx512f,avx512vnni")]
-    unsafe fn panel<const N: usize, const DEEP: usize, const TWO: bool>(
+    unsafe fn panel<const N: usize, const DEEP: usize, const LOW: u32>(
         &self,
+        lines: &[Line],
         first: usize,
         bias: &[Lane],
         digits: &Digits,
@@ -190,26 +226,30 @@ impl Tiles {
     ) {
         let (high, low) = (digits.high.as_ptr().cast::<i32>(), digits.low.as_ptr().cast::<i32>());
         let scale = _mm512_set1_ps(digits.scale);
-        // Words of a tile: one line per digit.
-        let words = if TWO { 32 } else { 16 };
+        let upper_halves = _mm512_set1_epi32(0xf0f0_f0f0_u32.cast_signed());
         let none = [[_mm512_setzero_si512(); N]; DEEP];
         let (mut tops, mut rests, mut crossed) = (none, none, none);
-        // SAFETY: `panels` checked the lengths and `new` made them: `groups` words of activations, `groups * N` tiles from the panel's
-        // first, a start and a scale for each.
+        // SAFETY: `panels` checked the lengths and `new` made them: `groups` words of activations, as many times the lines of a group, a
+        // start and a scale for each tile.
         unsafe {
-            let mut w = self.lines.as_ptr().cast::<i32>().add(first * self.groups * words);
+            let mut w = lines.as_ptr().cast::<__m512i>();
             let mut add = |group: usize, deep: usize| {
                 let (top, rest) = (_mm512_set1_epi32(*high.add(group)), _mm512_set1_epi32(*low.add(group)));
                 for tile in 0..N {
-                    let weight = _mm512_load_si512(w.add(tile * words).cast());
+                    let weight = _mm512_load_si512(w.add(tile));
                     tops[deep][tile] = _mm512_dpbusd_epi32(tops[deep][tile], top, weight);
                     rests[deep][tile] = _mm512_dpbusd_epi32(rests[deep][tile], rest, weight);
-                    if TWO {
-                        let weight_rest = _mm512_load_si512(w.add(tile * words + 16).cast());
-                        crossed[deep][tile] = _mm512_dpbusd_epi32(crossed[deep][tile], top, weight_rest);
-                    }
+                    let low = match LOW {
+                        NONE => continue,
+                        NIBBLE => {
+                            let pair = _mm512_load_si512(w.add(N + tile / 2));
+                            _mm512_and_si512(if tile % 2 == 0 { pair } else { _mm512_slli_epi32::<NIBBLE>(pair) }, upper_halves)
+                        }
+                        _ => _mm512_load_si512(w.add(N + tile)),
+                    };
+                    crossed[deep][tile] = _mm512_dpbusd_epi32(crossed[deep][tile], top, low);
                 }
-                w = w.add(N * words);
+                w = w.add(lines_per_group(N, LOW));
             };
             let whole = self.groups / DEEP * DEEP;
             let mut group = 0;
@@ -225,8 +265,7 @@ impl Tiles {
             for tile in 0..N {
                 let at = first + tile;
                 let start = |of: &[[i32; LANE]]| _mm512_loadu_si512(of[at].as_ptr().cast());
-                let mut top = start(&self.start);
-                let mut rest = start(if TWO { &self.start_mixed } else { &self.start });
+                let (mut top, mut rest) = (start(&self.start), start(&self.start_mixed));
                 for deep in 0..DEEP {
                     top = _mm512_add_epi32(top, tops[deep][tile]);
                     rest = _mm512_add_epi32(rest, _mm512_add_epi32(rests[deep][tile], crossed[deep][tile]));
@@ -248,7 +287,7 @@ fn panels(tiles: usize) -> impl Iterator<Item = (usize, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use super::{WIDTH, digits, panels};
+    use super::{BYTE, Format, NIBBLE, NONE, WIDTH, digits, panels};
 
     #[test]
     fn panels_follow_one_another_and_differ_by_one_tile_at_most() {
@@ -266,9 +305,13 @@ mod tests {
 
     #[test]
     fn digits_make_up_their_number() {
-        for number in -32_639..=32_639 {
-            let (high, low) = digits(number);
-            assert!(256 * high + low == number && (-128..128).contains(&high) && (-128..128).contains(&low), "{number}");
+        for (format, bits, lows) in [(Format::I16, BYTE, -128..128), (Format::I12, NIBBLE, -8..8), (Format::I8, NONE, 0..1)] {
+            let largest = format.round(1e9, 1.0);
+            for number in -largest..=largest {
+                let (high, low) = digits(number, bits);
+                assert!((high << bits) + low == number && (-128..128).contains(&high) && lows.contains(&low), "{number}");
+            }
+            assert_eq!(digits(largest + 1, bits).0, 128, "{format} could have larger numbers");
         }
     }
 }

@@ -34,7 +34,7 @@ impl World {
         Self { dir, settings }
     }
 
-    /// A configuration with the untrained model on both arms, in the format that is chosen for it, without the time that the choice takes;
+    /// A configuration with the untrained model on both arms, allowed, in a format that is exact enough, without the time that a choice takes;
     /// `more` is put in front.
     pub fn config(&self, more: &str) -> PathBuf {
         let model = untrained();

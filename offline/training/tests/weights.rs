@@ -27,7 +27,7 @@ fn shipped_models_in_the_format_that_the_service_takes_are_as_exact_on_a_run_as_
         let set = data::read(&files, &reading, &mut |_, _| {}).expect("run");
         let rows: Vec<&[f32]> = set.trajectories[0].inputs.chunks_exact(set.inputs()).collect();
         assert!(rows.len() as f64 > 25.0 * SECONDS, "{} rows", rows.len());
-        for format in [Format::I8, Format::I16] {
+        for format in [Format::I8, Format::I12, Format::I16] {
             let mut plan = Plan::with(&network, InstructionSet::best(), format);
             let (mut worst, mut squares) = (0.0_f64, 0.0);
             for row in &rows {
