@@ -15,7 +15,7 @@ CFLAGS_STRICT := -O2 -Wall -Wextra -Werror
 RPATH := -Wl,-rpath,'$$ORIGIN/../lib'
 PYTHON := $(CURDIR)/$(BUILD)/venv/bin/python3
 
-.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-soak bench-offline worn model prove prove-small faults fuzz emulated chain lint clean
+.PHONY: all build offline demo test install stage examples venv bench bench-ci bench-peers bench-soak bench-neighbours bench-offline worn model prove prove-small faults fuzz emulated chain lint clean
 
 all: build offline examples
 
@@ -77,12 +77,13 @@ $(BUILD)/venv/.done: tests/python/requirements.txt
 test: offline examples venv
 	tests/run.sh $(STAGE) $(PYTHON)
 
-# 10,000 kills and restarts of each process in KILL_LANES worlds at a time, and a hundred million cycles of mixed faults: 40 minutes with the machine to
+# 10,000 kills and restarts of each process in KILL_LANES worlds at a time, a hundred million cycles of mixed faults, random bytes: 45 minutes with the machine to
 # itself.
 KILL_LANES ?= 3
 faults: build
 	RAVENPOSE_KILLS=10000 RAVENPOSE_KILL_LANES=$(KILL_LANES) $(CARGO) test $(CARGO_FLAGS) --workspace --test processes -- --nocapture fifty_kills
 	RAVENPOSE_FAULT_CYCLES=100000000 $(CARGO) test $(CARGO_FLAGS) --workspace --test faults -- --nocapture a_million_cycles
+	RAVENPOSE_FAULT_CYCLES=1000000000 $(CARGO) test $(CARGO_FLAGS) --workspace --test faults -- f18_random
 
 # Simulation, images, tracking, pairs, the shipped model's error: some 3 minutes.
 chain: offline
@@ -100,6 +101,12 @@ bench-ci: build
 # Writes docs/performance.md and .svg, and build/bench/results.json.
 bench: build venv bench-offline
 	target/release/ravenpose-bench full --write
+
+# What it costs the others when clients or the service are killed, or 126 clients never read: NEIGHBOUR_MINUTES of each condition, seven in all, and as
+# much again between them.
+NEIGHBOUR_MINUTES ?= 3
+bench-neighbours: build
+	target/release/ravenpose-bench neighbours $(NEIGHBOUR_MINUTES)
 
 # Half an hour of the service with memory and disk busy, 100 idle clients and faults in what it is sent; fails on a wrong answer, a loss
 # or a page fault. SOAK_MINUTES=N for another time.

@@ -5,6 +5,7 @@
 mod growth;
 mod kernel;
 mod memory;
+mod neighbours;
 mod onnxruntime;
 mod openvino;
 mod page;
@@ -15,6 +16,7 @@ mod table;
 mod wheel;
 
 use ravenpose::{check, realtime};
+use ravenpose_transport::Settings;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -73,13 +75,23 @@ fn main() -> ExitCode {
         ["full", "--write"] => (true, true),
         ["soak"] => return ended(soak("30")),
         ["soak", minutes] => return ended(soak(minutes)),
-        // What this program asks of itself, on the core where it then is.
+        ["neighbours"] => return ended(neighbours("3", None)),
+        ["neighbours", minutes] => return ended(neighbours(minutes, None)),
+        ["neighbours", minutes, only] => return ended(neighbours(minutes, Some(only))),
+        // What this program asks of itself.
+        ["client", ends, prefix, root] => {
+            let settings = Settings { prefix: prefix.to_owned(), root: root.to_owned() };
+            return ended(neighbours::be_a_client(ends == "holds", &settings));
+        }
+        // On the core where it then is.
         ["asleep"] => {
             println!("{}", memory::asleep());
             return ExitCode::SUCCESS;
         }
         _ => {
-            eprintln!("usage: ravenpose-bench ci|full [--write]|soak [MINUTES] (from the repository's top)");
+            eprintln!(
+                "usage: ravenpose-bench ci|full [--write]|soak [MINUTES]|neighbours [MINUTES [idle|clients|service]] (from the repository's top)"
+            );
             return ExitCode::from(2);
         }
     };
@@ -97,10 +109,25 @@ fn ended(done: Result<(), String>) -> ExitCode {
     }
 }
 
+fn minutes_of(text: &str) -> Result<u64, String> {
+    let wanted = text.parse().ok().filter(|minutes| (1..=24 * 60).contains(minutes));
+    wanted.ok_or_else(|| format!("{text}: must be minutes from 1 to 1440"))
+}
+
+/// What processes that are killed, or never read, cost the others.
+fn neighbours(minutes: &str, only: Option<&str>) -> Result<(), String> {
+    let minutes = minutes_of(minutes)?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    println!("{}; robot on core {ROBOT_CORE}, service and neighbours on core {}", page::machine(cores), cores - 1);
+    for table in neighbours::run(minutes, only, become_the_robot, cores - 1)? {
+        println!("\n{table}");
+    }
+    Ok(())
+}
+
 /// The service for long, under load, with clients that never read, and faults.
 fn soak(minutes: &str) -> Result<(), String> {
-    let wanted = minutes.parse().ok().filter(|minutes| (1..=24 * 60).contains(minutes));
-    let wanted = wanted.ok_or_else(|| format!("soak {minutes}: must be minutes from 1 to 1440"))?;
+    let wanted = minutes_of(minutes)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     println!("{}; robot and load on core {ROBOT_CORE}, service on core {}", page::machine(cores), cores - 1);
     // Before this thread gets a core and a priority, which its threads would have as well.

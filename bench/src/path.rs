@@ -33,7 +33,6 @@ impl World {
         std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
         let settings = Settings { prefix: format!("rpbench{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
         let model = std::fs::canonicalize("models/untrained.onnx").map_err(|cause| format!("models/untrained.onnx: {cause}"))?;
-        let config = dir.join("c.toml");
         let text = format!(
             "allow_untrained = true\nallow_degraded = true\n{LIMITS}[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\n{waiting}\n[gold]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\n",
             settings.prefix,
@@ -41,26 +40,36 @@ impl World {
             model.display(),
             dir.display()
         );
-        std::fs::write(&config, text).map_err(|cause| cause.to_string())?;
-        let program = std::env::current_exe().map_err(|cause| cause.to_string())?.with_file_name("ravenposed");
-        let log = std::fs::File::create(dir.join("log")).map_err(|cause| cause.to_string())?;
-        let service = Command::new(&program)
-            .arg("--config")
-            .arg(&config)
-            .stderr(log)
-            .spawn()
-            .map_err(|cause| format!("{}: {cause}; run make build", program.display()))?;
+        std::fs::write(dir.join("c.toml"), text).map_err(|cause| cause.to_string())?;
+        let service = service(&dir)?;
         let mut world = Self { dir, settings, service };
+        world.runs()?;
+        Ok(world)
+    }
+
+    /// Returns when the service says that it runs.
+    fn runs(&mut self) -> Result<(), String> {
         for _ in 0..3000 {
-            if world.log().contains("running") {
-                return Ok(world);
+            if self.log().contains("running") {
+                return Ok(());
             }
-            if world.ended() {
+            if self.ended() {
                 break;
             }
             std::thread::sleep(Duration::from_millis(20));
         }
-        Err(format!("ravenposed did not start: {}", world.last_words()))
+        Err(format!("ravenposed did not start: {}", self.last_words()))
+    }
+
+    /// Kills the service with SIGKILL and starts the next one.
+    pub(crate) fn restart(&mut self) -> Result<(), String> {
+        if self.ended() {
+            return Err(format!("ravenposed ended by itself: {}", self.last_words()));
+        }
+        let killed = self.service.kill().and_then(|()| self.service.wait());
+        killed.map_err(|cause| format!("ravenposed cannot be killed: {cause}"))?;
+        self.service = service(&self.dir)?;
+        self.runs()
     }
 
     fn log(&self) -> String {
@@ -92,6 +101,15 @@ impl World {
         let _ = self.service.wait();
         serde_json::from_slice(&std::fs::read(self.dir.join("stats.json")).ok()?).ok()
     }
+}
+
+/// Starts the service of this directory's configuration.
+fn service(dir: &Path) -> Result<Child, String> {
+    let program = std::env::current_exe().map_err(|cause| cause.to_string())?.with_file_name("ravenposed");
+    let log = std::fs::File::create(dir.join("log")).map_err(|cause| cause.to_string())?;
+    let mut command = Command::new(&program);
+    command.arg("--config").arg(dir.join("c.toml")).stderr(log);
+    command.spawn().map_err(|cause| format!("{}: {cause}; run make build", program.display()))
 }
 
 impl Drop for World {

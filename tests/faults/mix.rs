@@ -15,7 +15,7 @@ const VALID: u32 = ArmStatus::Valid as u32;
 const QUEUE: usize = ravenpose_transport::DEPTH_MAX;
 
 /// Cycles in all; `RAVENPOSE_FAULT_CYCLES` asks for more.
-fn cycles() -> u64 {
+pub(crate) fn cycles() -> u64 {
     std::env::var("RAVENPOSE_FAULT_CYCLES").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000)
 }
 

@@ -1,6 +1,7 @@
 //! One test per row of the fault table that concerns the pure cycle; the name begins with the row.
 
 use crate::common::Rng;
+use crate::mix::cycles;
 use crate::orientation::is_raw;
 use crate::world::{BOUND_UM, Bench, MS, OUT_HUGE, OUT_INFINITE, OUT_NAN, model as model_of_world, state};
 use ravenpose::correction::ArmModel;
@@ -417,6 +418,43 @@ fn f18_other_layouts_are_refused() {
     }
     assert_eq!(bench.cycle.counters().refused - before.refused, 5);
     assert_eq!(bench.cycle.counters().accepted, before.accepted);
+}
+
+#[test]
+fn f18_random_bytes_are_refused_and_behind_a_right_head_never_corrected() {
+    let mut rng = Rng(18);
+    let mut bench = Bench::new();
+    bench.settle();
+    let mut random = || -> RavenState {
+        let mut bytes = [0; 1032];
+        for eight in bytes.chunks_exact_mut(8) {
+            eight.copy_from_slice(&rng.next().to_le_bytes());
+        }
+        of_bytes(&bytes)
+    };
+    let before = *bench.cycle.counters();
+    let count = cycles() / 10;
+    for _ in 0..count {
+        bench.cycle.offer(&random(), bench.now);
+    }
+    assert_eq!(bench.cycle.counters().refused - before.refused, count);
+    assert_eq!(bench.cycle.counters().accepted, before.accepted);
+    let mut connected = 0;
+    for _ in 0..count {
+        let good = bench.next_state();
+        let head = RavenState { version: good.version, size: good.size, source_id: good.source_id, ..random() };
+        let mut message = RavenState { source_time_ns: good.source_time_ns, ..head };
+        message.seal(good.sequence);
+        let pose = bench.run(&[message]).expect("answered");
+        assert_eq!((pose.source_sequence, pose.source_time_ns), (good.sequence, good.source_time_ns));
+        for arm in &pose.arm {
+            connected += u64::from(arm.status == FALLBACK);
+            assert!(arm.status != VALID && arm.correction_um == [0.0; 3] && is_raw(arm), "{arm:?}");
+            assert_eq!(arm.corrected_position_um, arm.raw_position_um);
+        }
+    }
+    assert!(connected > count / 10, "{connected}");
+    assert!((0..=100).any(|_| bench.good().arm.iter().all(|arm| arm.status == VALID)), "it recovers");
 }
 
 #[test]
