@@ -9,7 +9,7 @@ use crate::cycle::{Cycle, Limits, Stopwatch};
 use crate::histogram::{Recorder, Stage};
 use crate::phase::{Found, PhaseLock};
 use crate::shared::{Event, EventSender, LinkCounters, Shared};
-use ravenpose_transport::{DEPTH_MAX, Listener, Loan, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{DEPTH_MAX, Listener, Reader, Settings, TransportError, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ARMS, CorrectedPose, FALLBACK_REASONS, RavenState};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -60,8 +60,6 @@ enum Waited {
 }
 
 struct Link {
-    /// Taken while there was nothing else to do.
-    next: Option<Loan<CorrectedPose>>,
     reader: Reader<RavenState>,
     writer: Writer<CorrectedPose>,
     listener: Option<Listener>,
@@ -70,29 +68,11 @@ struct Link {
 impl Link {
     fn open(settings: &Settings, wait: Wait) -> Result<Self, TransportError> {
         Ok(Self {
-            next: None,
             // The pose first: its one publisher's place tells whether another service runs.
             writer: Writer::open(settings)?,
             reader: Reader::open(settings, QUEUE)?,
             listener: (wait == Wait::Event).then(|| Listener::open(settings)).transpose()?,
         })
-    }
-
-    /// Does of sending what can be done before the pose is there.
-    fn prepare(&mut self) {
-        if self.next.is_none() {
-            self.next = self.writer.loan().ok();
-        }
-        if let Some(next) = &mut self.next {
-            next.touch();
-        }
-    }
-
-    fn send(&mut self, pose: &CorrectedPose) -> Result<usize, TransportError> {
-        match self.next.take() {
-            Some(next) => next.send(pose),
-            None => self.writer.send(pose),
-        }
     }
 }
 
@@ -307,9 +287,9 @@ impl<E: Estimator> Runner<E> {
         }
     }
 
-    fn prepare(&mut self) {
-        if let Some(link) = &mut self.link {
-            link.prepare();
+    fn prepare(&self) {
+        if let Some(link) = &self.link {
+            link.writer.prepare();
         }
     }
 
@@ -338,7 +318,7 @@ impl<E: Estimator> Runner<E> {
     }
 
     fn send(&mut self) {
-        if self.link.as_mut().is_none_or(|link| link.send(&self.pose).is_err()) {
+        if self.link.as_ref().is_none_or(|link| link.writer.send(&self.pose).is_err()) {
             self.link_counters.send_failures += 1;
         }
         self.shared.show_arms(&self.pose);

@@ -428,6 +428,79 @@ fn readers_that_never_read_cost_the_loop_nothing() {
     });
 }
 
+/// Takes every waiting pose; source sequences never fall, only those that are not valid repeat one, and nothing stale is valid.
+fn judged(reader: &Reader<CorrectedPose>, last: &mut Option<CorrectedPose>) -> u64 {
+    let mut count = 0;
+    while let Some(pose) = reader.next().expect("pose") {
+        let age_ns = pose.publish_time_ns - pose.source_time_ns;
+        let is_valid = pose.arm.iter().any(|arm| arm.status == VALID);
+        assert!(!is_valid || age_ns < ravenpose::cycle::Limits::default().stale_ns, "stale presented as fresh: {pose:?}");
+        if let Some(last) = last {
+            assert!(pose.sequence > last.sequence && pose.source_sequence >= last.source_sequence, "{pose:?} after {last:?}");
+            assert!(!is_valid || pose.source_sequence > last.source_sequence, "a state answered twice: {pose:?}");
+        }
+        *last = Some(pose);
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst() {
+    const PAUSE: Duration = Duration::from_millis(300);
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("pause");
+        let config = world.config("allow_untrained = true\nallow_degraded = true");
+        let service = world.start(&config, &[]);
+        let publisher = world.role("a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst", "publisher");
+        let reader = world.poses();
+        let mut last = None;
+        let valid = |last: &mut Option<CorrectedPose>| {
+            let mut count = 0;
+            world.until("valid", || {
+                count += judged(&reader, last);
+                last.is_some_and(|pose| pose.arm.iter().all(|arm| arm.status == VALID))
+            });
+            count
+        };
+        valid(&mut last);
+
+        service.signal(libc::SIGSTOP);
+        std::thread::sleep(PAUSE);
+        judged(&reader, &mut last);
+        let before = last.expect("a pose");
+        let (mut poses, resumed) = (0, Instant::now());
+        service.signal(libc::SIGCONT);
+        // The cycle that was cut in two may end first.
+        world.until("the newest state", || {
+            poses += judged(&reader, &mut last);
+            last.is_some_and(|pose| pose.source_sequence > before.source_sequence + 1)
+        });
+        let first = last.expect("a pose");
+        assert!(poses <= 2 + resumed.elapsed().as_millis() as u64, "{poses} poses at once");
+        let passed = first.source_sequence - before.source_sequence;
+        assert!(passed as u128 > PAUSE.as_millis() / 2, "the backlog was replayed from {passed} states on");
+        assert!(first.skipped - before.skipped > PAUSE.as_millis() as u64 / 2, "{first:?}");
+        poses += valid(&mut last);
+        assert!(poses <= 5 + resumed.elapsed().as_millis() as u64, "{poses} poses in {:?}", resumed.elapsed());
+
+        publisher.signal(libc::SIGSTOP);
+        world.until("stale", || {
+            judged(&reader, &mut last);
+            last.is_some_and(|pose| pose.arm.iter().all(|arm| arm.status != VALID && arm.flags & flag::INPUT_STALE != 0))
+        });
+        let before = last.expect("a pose");
+        std::thread::sleep(PAUSE);
+        publisher.signal(libc::SIGCONT);
+        valid(&mut last);
+        assert_eq!(last.expect("a pose").source_id, before.source_id);
+    });
+}
+
 #[test]
 fn a_second_service_is_refused_and_the_first_lives_on() {
     let _machine = machine();

@@ -49,6 +49,23 @@ fn unsafe_stands_only_in_modules_that_name_it() {
     }
 }
 
+/// F25: a wall clock that is set changes no output.
+#[test]
+fn the_service_and_the_bridge_read_the_wall_clock_only_to_date_their_files() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let rooms = ["src", "transport/src", "wire/src", "bridge/src"].map(|room| top.join(room));
+    let mut readers: Vec<_> = all()
+        .into_iter()
+        .filter(|(path, _)| rooms.iter().any(|room| path.starts_with(room)))
+        .filter(|(_, text)| {
+            ["SystemTime", "CLOCK_REALTIME", "ClockId::Realtime", "gettimeofday"].iter().any(|clock| text.contains(clock))
+        })
+        .map(|(path, _)| path.strip_prefix(top).expect("of this repository").to_path_buf())
+        .collect();
+    readers.sort();
+    assert_eq!(readers, [Path::new("src/report.rs")]);
+}
+
 #[test]
 fn there_are_no_stubs_and_no_ignored_tests() {
     let marks =

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// One condition at a stretch.
-const BLOCK: Duration = Duration::from_secs(10);
+const BLOCK: Duration = Duration::from_secs(20);
 /// After a change of conditions nothing counts for so long: connections are made and taken down.
 const BETWEEN: Duration = Duration::from_secs(2);
 /// A service lives so long after it says that it runs.
@@ -227,8 +227,9 @@ pub(crate) fn be_a_client(holds: bool, settings: &Settings) -> Result<(), String
     let mut has_one = false;
     while !has_one {
         let taken = reader.drain(|_| {
-            has_one = true;
-            println!("holds a pose");
+            if !std::mem::replace(&mut has_one, true) {
+                println!("holds a pose");
+            }
             if holds {
                 std::thread::sleep(Duration::MAX);
             }
@@ -260,7 +261,9 @@ fn robot(
         let state = state(sequence);
         let sent = now_ns();
         writer.send(&state).map_err(failed)?;
+        // As the bridge does.
         bell.ring();
+        writer.prepare();
         let handed_over = now_ns();
         let answer = reader
             .wait(sent + PATIENCE_NS, 0, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))

@@ -192,7 +192,9 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
         let state = state(sequence);
         let sent = now_ns();
         writer.send(&state).map_err(|error| error.to_string())?;
+        // As the bridge does.
         bell.ring();
+        writer.prepare();
         if sequence > WARM_UP {
             handed_over.push(now_ns() - sent);
         }

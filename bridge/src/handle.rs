@@ -34,6 +34,7 @@ impl Publisher {
     pub(crate) fn open(settings: &Settings) -> Result<Self, (Code, String)> {
         let writer = Writer::open(settings).map_err(|error| refused(&error))?;
         let bell = Bell::open(settings).map_err(|error| refused(&error))?;
+        writer.prepare();
         Ok(Self { writer, bell, loan: None, source_id: source_id(), next_sequence: 1 })
     }
 
@@ -88,6 +89,8 @@ impl Publisher {
             Ok(_) => {
                 // Costs a system call only while a service with wait = "event" listens.
                 self.bell.ring();
+                // The service has the state and works on it: what the next one needs is paid for now.
+                self.writer.prepare();
                 Code::Ok
             }
             Err(error) => Code::of(&error),
