@@ -102,8 +102,8 @@ bench-ci: build
 bench: build venv bench-offline
 	target/release/ravenpose-bench full --write
 
-# What it costs the others when clients or the service are killed, or 126 clients never read: NEIGHBOUR_MINUTES of each condition, seven in all, and as
-# much again between them.
+# What it costs the others when clients or the service are killed, or 126 clients never read: NEIGHBOUR_MINUTES of each condition, seven in all, and a
+# fifth more between them.
 NEIGHBOUR_MINUTES ?= 3
 bench-neighbours: build
 	target/release/ravenpose-bench neighbours $(NEIGHBOUR_MINUTES)

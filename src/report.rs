@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Version of `stats.json`.
 pub const STATS_VERSION: u32 = 1;
@@ -166,7 +166,9 @@ pub fn hgrm(histogram: &Histogram<u64>) -> String {
 pub struct Log {
     dir: PathBuf,
     path: PathBuf,
+    /// When the run began: to date it, and to place intervals whatever is done to the wall clock.
     started: SystemTime,
+    since: Instant,
 }
 
 impl Log {
@@ -178,7 +180,8 @@ impl Log {
         fs::create_dir_all(dir)?;
         let started = SystemTime::now();
         let seconds = started.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-        Ok(Self { dir: dir.to_owned(), path: dir.join(format!("ravenposed-{seconds}-{}.hlog", std::process::id())), started })
+        let path = dir.join(format!("ravenposed-{seconds}-{}.hlog", std::process::id()));
+        Ok(Self { dir: dir.to_owned(), path, started, since: Instant::now() })
     }
 
     /// Appends one interval.
@@ -212,7 +215,7 @@ impl Log {
     fn interval(&self, interval: &Histograms, length: Duration) -> io::Result<String> {
         let mut bytes = Vec::new();
         let mut serializer = V2DeflateSerializer::new();
-        let end = SystemTime::now().duration_since(self.started).unwrap_or_default();
+        let end = self.since.elapsed();
         let mut log = IntervalLogWriterBuilder::new()
             .add_comment("ravenposed latencies, ns; one tag per stage")
             .with_base_time(self.started)

@@ -10,7 +10,7 @@ use iceoryx2::prelude::{Config, FileName, Path, SemanticString as _, ServiceName
 use iceoryx2::service::builder::publish_subscribe::{Builder, PublishSubscribeOpenError};
 use ravenpose_transport::{DEPTH_MAX, Message, Reader, Settings, TransportError, Writer};
 use ravenpose_wire::{CorrectedPose, RavenState};
-use service::{CONFIG, World};
+use service::{CONFIG, Process, World};
 
 /// The next layout, of the same size.
 #[repr(C)]
@@ -65,11 +65,12 @@ fn like_ours<T: ZeroCopySend + std::fmt::Debug>(
         .max_nodes(readers + 8)
 }
 
-fn assert_foreign<T: Message>(found: Result<impl Sized, TransportError>, what: &str) {
+fn assert_foreign<T: Message>(found: Result<impl Sized, TransportError>, why: &str, what: &str) {
     match found {
         Err(error @ TransportError::Foreign { .. }) => {
             let line = error.to_string();
-            let start = format!("service {} exists with other contents than {} (", T::SERVICE, T::TYPE);
+            let start =
+                format!("service {} exists with other contents than {} (PublishSubscribeOpenError({why}))", T::SERVICE, T::TYPE);
             assert!(line.starts_with(&start) && line.ends_with("stop the program that made it, or update it"), "{what}: {line}");
         }
         Err(error) => panic!("{what}: {error}"),
@@ -77,13 +78,15 @@ fn assert_foreign<T: Message>(found: Result<impl Sized, TransportError>, what: &
     }
 }
 
-/// Both of our ports, and the service itself, against what somebody else has made under `T`'s name.
-fn all_refuse<T: Message>(world: &World, what: &str) {
-    assert_foreign::<T>(Writer::<T>::open(&world.settings), what);
-    assert_foreign::<T>(Reader::<T>::open(&world.settings, 1), what);
-    let output = world.service(&world.config(CONFIG)).output().expect("the service ends");
-    let words = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{what}: {words}");
+/// Both of our ports, and the service itself, against what somebody else has made under `T`'s name; `why` is iceoryx2's word for it.
+fn all_refuse<T: Message>(world: &World, why: &str, what: &str) {
+    assert_foreign::<T>(Writer::<T>::open(&world.settings), why, what);
+    assert_foreign::<T>(Reader::<T>::open(&world.settings, 1), why, what);
+    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
+    let mut service = Process(world.service(&world.config(CONFIG)).stderr(log).spawn().expect("the service starts"));
+    let status = service.end();
+    let words = world.log();
+    assert_eq!(status.code(), Some(2), "{what}: {words}");
     let last = words.lines().last().unwrap_or_default();
     assert!(last.contains(T::SERVICE) && last.contains("exists with other contents than"), "{what}: {words}");
 }
@@ -92,28 +95,29 @@ fn all_refuse<T: Message>(world: &World, what: &str) {
 fn a_service_of_our_name_with_other_contents_is_refused_by_every_party() {
     let world = World::new("foreign");
     let other = node(&world.settings);
+    // What is wrong below is only what it says: with nothing wrong it would be ours.
+    let ours = like_ours::<RavenState>(&other, RavenState::SERVICE, RavenState::MAX_READERS).create().expect("as ours");
+    drop(Reader::<RavenState>::open(&world.settings, 1).expect("as ours"));
+    drop(ours);
     macro_rules! refused {
-        ($ours:ty, $theirs:ty, $readers:expr, $what:expr) => {
+        ($ours:ty, $theirs:ty, $readers:expr, $why:expr, $what:expr) => {
             let theirs = like_ours::<$theirs>(&other, <$ours>::SERVICE, $readers).create().expect($what);
-            all_refuse::<$ours>(&world, $what);
+            all_refuse::<$ours>(&world, $why, $what);
             drop(theirs);
         };
     }
-    refused!(RavenState, NextState, RavenState::MAX_READERS, "states of the next layout");
-    refused!(RavenState, LongState, RavenState::MAX_READERS, "states that are longer");
-    refused!(RavenState, ShortState, RavenState::MAX_READERS, "states that are shorter");
-    refused!(RavenState, CorrectedPose, RavenState::MAX_READERS, "poses where states belong");
-    refused!(RavenState, RavenState, 2, "states for fewer readers");
-    refused!(CorrectedPose, EarlierPose, CorrectedPose::MAX_READERS, "poses of an earlier layout");
-    refused!(CorrectedPose, LongPose, CorrectedPose::MAX_READERS, "poses that are longer");
-    refused!(CorrectedPose, CorrectedPose, 2, "poses for fewer readers");
-    let slow = other
-        .service_builder(&ServiceName::new(RavenState::SERVICE).expect("a name"))
-        .publish_subscribe::<RavenState>()
-        .enable_safe_overflow(false)
-        .create()
-        .expect("states that a slow reader holds up");
-    all_refuse::<RavenState>(&world, "states that a slow reader holds up");
+    let (types, readers) = ("IncompatibleTypes", "DoesNotSupportRequestedAmountOfSubscribers");
+    refused!(RavenState, NextState, RavenState::MAX_READERS, types, "states of the next layout");
+    refused!(RavenState, LongState, RavenState::MAX_READERS, types, "states that are longer");
+    refused!(RavenState, ShortState, RavenState::MAX_READERS, types, "states that are shorter");
+    refused!(RavenState, CorrectedPose, RavenState::MAX_READERS, types, "poses where states belong");
+    refused!(RavenState, RavenState, 2, readers, "states for fewer readers");
+    refused!(CorrectedPose, EarlierPose, CorrectedPose::MAX_READERS, types, "poses of an earlier layout");
+    refused!(CorrectedPose, LongPose, CorrectedPose::MAX_READERS, types, "poses that are longer");
+    refused!(CorrectedPose, CorrectedPose, 2, readers, "poses for fewer readers");
+    let slow = like_ours::<RavenState>(&other, RavenState::SERVICE, RavenState::MAX_READERS).enable_safe_overflow(false);
+    let slow = slow.create().expect("states that a slow reader holds up");
+    all_refuse::<RavenState>(&world, "IncompatibleOverflowBehavior", "states that a slow reader holds up");
     drop(slow);
     // They are gone, and nothing of the refusals is left in the way.
     let _writer = Writer::<RavenState>::open(&world.settings).expect("ours");

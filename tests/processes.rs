@@ -448,6 +448,8 @@ fn judged(reader: &Reader<CorrectedPose>, last: &mut Option<CorrectedPose>) -> u
 #[test]
 fn a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst() {
     const PAUSE: Duration = Duration::from_millis(300);
+    /// Poses beyond one a millisecond: the cycle that was cut in two, the newest of what waited, a robot that catches up. A backlog is 64.
+    const SLACK: u64 = 20;
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
@@ -481,12 +483,13 @@ fn a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst(
             last.is_some_and(|pose| pose.source_sequence > before.source_sequence + 1)
         });
         let first = last.expect("a pose");
-        assert!(poses <= 2 + resumed.elapsed().as_millis() as u64, "{poses} poses at once");
+        let most = |since: Instant| SLACK + since.elapsed().as_millis() as u64;
+        assert!(poses <= most(resumed), "{poses} poses at once");
         let passed = first.source_sequence - before.source_sequence;
         assert!(passed as u128 > PAUSE.as_millis() / 2, "the backlog was replayed from {passed} states on");
         assert!(first.skipped - before.skipped > PAUSE.as_millis() as u64 / 2, "{first:?}");
         poses += valid(&mut last);
-        assert!(poses <= 5 + resumed.elapsed().as_millis() as u64, "{poses} poses in {:?}", resumed.elapsed());
+        assert!(poses <= most(resumed), "{poses} poses in {:?}", resumed.elapsed());
 
         publisher.signal(libc::SIGSTOP);
         world.until("stale", || {
@@ -495,9 +498,17 @@ fn a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst(
         });
         let before = last.expect("a pose");
         std::thread::sleep(PAUSE);
+        judged(&reader, &mut last);
+        let resumed = Instant::now();
         publisher.signal(libc::SIGCONT);
-        valid(&mut last);
-        assert_eq!(last.expect("a pose").source_id, before.source_id);
+        let poses = valid(&mut last);
+        let after = last.expect("a pose");
+        assert!(poses <= most(resumed), "{poses} poses in {:?}", resumed.elapsed());
+        assert!(
+            after.source_sequence >= before.source_sequence + u64::from(ravenpose::cycle::Limits::default().good_cycles),
+            "{after:?}"
+        );
+        assert!((0..2).all(|arm| after.arm[arm].reset_count == before.arm[arm].reset_count), "announced once: {after:?}");
     });
 }
 

@@ -119,10 +119,7 @@ fn neighbours(minutes: &str, only: Option<&str>) -> Result<(), String> {
     let minutes = minutes_of(minutes)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     println!("{}; robot on core {ROBOT_CORE}, service and neighbours on core {}", page::machine(cores), cores - 1);
-    for table in neighbours::run(minutes, only, become_the_robot, cores - 1)? {
-        println!("\n{table}");
-    }
-    Ok(())
+    neighbours::run(minutes, only, become_the_robot, cores - 1)
 }
 
 /// The service for long, under load, with clients that never read, and faults.

@@ -1,7 +1,7 @@
 //! What processes that are killed, or never read, cost the others: a robot at 1 kHz that goes on through all of it, quiet and disturbed in
 //! turn, block by block, so that what the machine does falls on all alike.
 
-use crate::path::{PERIOD_NS, World, state};
+use crate::path::{PATIENCE_NS, PERIOD_NS, World, state};
 use crate::table::{Table, quantiles};
 use ravenpose::realtime;
 use ravenpose_transport::{Bell, Message as _, Reader, Settings, Writer, now_ns, sleep_until_ns};
@@ -17,8 +17,8 @@ const BLOCK: Duration = Duration::from_secs(20);
 const BETWEEN: Duration = Duration::from_secs(2);
 /// A service lives so long after it says that it runs.
 const SERVICE_LIVES: Duration = Duration::from_millis(700);
-/// Answers later than this are given up: the next state is due.
-const PATIENCE_NS: i64 = 900_000;
+/// A client to which no pose comes for so long ends.
+const PATIENCE: Duration = Duration::from_secs(10);
 /// No condition: what is measured then is not kept.
 const BETWEEN_BLOCKS: usize = usize::MAX;
 /// Queue of a client that is there to be killed, or never reads.
@@ -63,7 +63,7 @@ struct Seen {
     due: Vec<i64>,
     /// The call alone.
     call: Vec<i64>,
-    /// State handed over to its pose read.
+    /// State sent to its pose read.
     whole: Vec<i64>,
     missed: u64,
 }
@@ -81,7 +81,7 @@ impl Part {
         match self {
             Self::Due => "state due -> handed over: the controller's own",
             Self::Call => "the publish call of it",
-            Self::Whole => "state handed over -> pose read",
+            Self::Whole => "state sent -> pose read",
         }
     }
 
@@ -94,13 +94,17 @@ impl Part {
     }
 }
 
-/// Asks all questions, or one of them, with `minutes` for each condition; an error if a pose or a state could not be sent.
-pub(crate) fn run(minutes: u64, only: Option<&str>, become_the_robot: fn(), core: usize) -> Result<Vec<Table>, String> {
+/// Asks all questions, or one of them, with `minutes` for each condition, and prints what came of each; an error if a state could not be
+/// sent, or a pose of the last service.
+pub(crate) fn run(minutes: u64, only: Option<&str>, become_the_robot: fn(), core: usize) -> Result<(), String> {
     let wanted = |name: &str| only.is_none_or(|only| only == name);
     if !QUESTIONS.iter().any(|(name, _)| wanted(name)) {
         return Err(format!("{}: must be idle, clients or service", only.unwrap_or_default()));
     }
-    QUESTIONS.into_iter().filter(|(name, _)| wanted(name)).map(|(_, all)| ask(all, minutes, become_the_robot, core)).collect()
+    for (_, all) in QUESTIONS.into_iter().filter(|(name, _)| wanted(name)) {
+        println!("\n{}", ask(all, minutes, become_the_robot, core)?);
+    }
+    Ok(())
 }
 
 fn ask(conditions: &[Condition], minutes: u64, become_the_robot: fn(), core: usize) -> Result<Table, String> {
@@ -162,6 +166,9 @@ fn disturb(
             let place = (turn + round as usize) % conditions.len();
             if is_over() {
                 return Ok(counts);
+            }
+            if world.ended() {
+                return Err(format!("the service ended by itself: {}", world.last_words()));
             }
             let idle: Vec<_> = match conditions[place] {
                 // The robot has one place, and one is for whoever looks on.
@@ -225,7 +232,12 @@ impl Drop for Process {
 pub(crate) fn be_a_client(holds: bool, settings: &Settings) -> Result<(), String> {
     let reader = Reader::<CorrectedPose>::open(settings, DEPTH).map_err(|error| error.to_string())?;
     let mut has_one = false;
+    let deadline = Instant::now() + PATIENCE;
     while !has_one {
+        if Instant::now() > deadline {
+            return Err("no pose came".to_owned());
+        }
+        std::thread::sleep(Duration::from_micros(100));
         let taken = reader.drain(|_| {
             if !std::mem::replace(&mut has_one, true) {
                 println!("holds a pose");

@@ -15,7 +15,7 @@ pub(crate) const PERIOD_NS: i64 = 1_000_000;
 /// Name of the thread whose faults count, as /proc has it.
 const LOOP_THREAD: &str = "(ravenpose-loop)";
 /// Answers later than this are given up: the next state is due.
-const PATIENCE_NS: i64 = 900_000;
+pub(crate) const PATIENCE_NS: i64 = 900_000;
 /// Wide: a machine that stops for a moment is to make no pose uncorrected.
 const LIMITS: &str = "[limits]\nstale_us = 1000000\nbudget_us = 100000\nlate_fallback = 1000\n";
 /// States before anything is measured: connecting, warming up, becoming valid.

@@ -23,9 +23,10 @@ fn refused(error: &TransportError) -> (Code, String) {
 
 /// The one publisher of states.
 pub struct Publisher {
+    /// Dropped before the port.
+    loan: Option<Loan<RavenState>>,
     writer: Writer<RavenState>,
     bell: Bell,
-    loan: Option<Loan<RavenState>>,
     source_id: u64,
     next_sequence: u64,
 }
@@ -35,7 +36,7 @@ impl Publisher {
         let writer = Writer::open(settings).map_err(|error| refused(&error))?;
         let bell = Bell::open(settings).map_err(|error| refused(&error))?;
         writer.prepare();
-        Ok(Self { writer, bell, loan: None, source_id: source_id(), next_sequence: 1 })
+        Ok(Self { loan: None, writer, bell, source_id: source_id(), next_sequence: 1 })
     }
 
     pub(crate) fn loan(&mut self) -> Result<*mut RavenState, Code> {

@@ -50,16 +50,23 @@ fn million() -> ! {
             assert_eq!(ravenpose_publisher_open(&Options::default(), &raw mut publisher, null_mut(), 0), 0);
             assert_eq!(ravenpose_pose_reader_open(&Options::default(), &raw mut reader, null_mut(), 0), 0);
         }
+        let mut own = RavenState::new();
         let mut pose = CorrectedPose::new();
         let mut got = CorrectedPose::new();
         let mut calls = |count: u64| {
             for call in 0..count {
-                let mut state = null_mut();
-                // SAFETY: live handles, and `state` was given by `loan`.
-                unsafe {
-                    assert_eq!(ravenpose_publisher_loan(publisher, &raw mut state), 0);
-                    (*state).pos[0] = call as i32;
-                    assert_eq!(ravenpose_publisher_send(publisher), 0);
+                if call % 2 == 0 {
+                    let mut state = null_mut();
+                    // SAFETY: live handles, and `state` was given by `loan`.
+                    unsafe {
+                        assert_eq!(ravenpose_publisher_loan(publisher, &raw mut state), 0);
+                        (*state).pos[0] = call as i32;
+                        assert_eq!(ravenpose_publisher_send(publisher), 0);
+                    }
+                } else {
+                    own.pos[0] = call as i32;
+                    // SAFETY: live handle and a state.
+                    assert_eq!(unsafe { ravenpose_publisher_publish(publisher, &raw const own) }, 0);
                 }
                 // Sometimes the service does not keep up, sometimes it sleeps: nothing holds the publisher up.
                 if call % 3 == 0 {

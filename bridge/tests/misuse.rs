@@ -4,6 +4,7 @@
 mod common;
 
 use ravenpose_bridge::*;
+use ravenpose_transport::{Reader, Settings};
 use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
 use std::ffi::{CStr, CString, c_char};
 use std::ptr::{null, null_mut};
@@ -124,6 +125,40 @@ fn one_publisher_only_and_its_place_is_free_again_after_close() {
         assert_eq!(ravenpose_publisher_open(&options(&name), &raw mut second, null_mut(), 0), 0);
         ravenpose_publisher_close(&raw mut second);
     }
+}
+
+#[test]
+fn a_state_on_loan_stays_on_loan_while_others_are_published() {
+    let name = prefix("both");
+    let settings = Settings { prefix: name.0.to_str().expect("UTF-8").to_owned(), ..Settings::default() };
+    let mut publisher = null_mut();
+    let mut state = null_mut();
+    let mut sequences = Vec::new();
+    // SAFETY: valid pointers; `state` was given by `loan` and not sent yet.
+    unsafe {
+        assert_eq!(ravenpose_publisher_open(&options(&name), &raw mut publisher, null_mut(), 0), 0);
+        let reader = Reader::<RavenState>::open(&settings, 4).expect("the service's end");
+        assert_eq!(ravenpose_publisher_loan(publisher, &raw mut state), 0);
+        (*state).pos[0] = -7;
+        for count in 0..1000 {
+            let mut other = RavenState::new();
+            other.pos[0] = count;
+            assert_eq!(ravenpose_publisher_publish(publisher, &raw const other), 0, "{count}");
+            let taken = reader.next().expect("received").expect("one waits");
+            assert_eq!(taken.pos[0], count);
+            sequences.push(taken.sequence);
+        }
+        let mut again = null_mut();
+        assert_eq!(ravenpose_publisher_loan(publisher, &raw mut again), 0);
+        assert_eq!((again, (*state).pos[0]), (state, -7));
+        (*state).sequence = 0;
+        assert_eq!(ravenpose_publisher_send(publisher), 0);
+        let taken = reader.next().expect("received").expect("one waits");
+        assert_eq!(taken.pos[0], -7);
+        sequences.push(taken.sequence);
+        ravenpose_publisher_close(&raw mut publisher);
+    }
+    assert_eq!(sequences, (1..=1001).collect::<Vec<_>>());
 }
 
 #[test]

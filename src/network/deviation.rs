@@ -9,7 +9,8 @@ use thiserror::Error;
 
 /// Random inputs beside the golden ones.
 pub const RANDOM_INPUTS: usize = 256;
-/// Formats that a free choice tries, smallest first. Of those with 16 bits the one with the least error.
+/// Formats that a free choice tries, smallest first: 12 bits only where they take less room than 16. Of those with 16 the one with the
+/// least error.
 const CANDIDATES: [Format; 4] = [Format::I8, Format::I12, Format::I16, Format::F32];
 
 /// How far a plan's outputs are from float64's.
@@ -62,11 +63,12 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
     inputs.extend((0..RANDOM_INPUTS).map(|_| random_input(network, &mut random)));
     let truths = evaluate(network, &inputs, |_, _| ());
     let candidates = asked.as_ref().map_or(&CANDIDATES[..], std::slice::from_ref);
-    let (mut last, spreads) = (None, OnceCell::new());
-    for &format in candidates {
+    let set = InstructionSet::best();
+    let (mut last, known) = (None, OnceCell::new());
+    for &format in candidates.iter().filter(|format| asked.is_some() || **format != Format::I12 || set.packs_12_bits()) {
         // The same for each format that wants them.
-        let spreads: &[_] = if format.is_rounded_together() { spreads.get_or_init(|| rounding::spreads(network)) } else { &[] };
-        let mut plan = Plan::rounded(network, InstructionSet::best(), format, spreads);
+        let spreads: &[_] = if format.is_rounded_together() { known.get_or_init(|| rounding::spreads(network)) } else { &[] };
+        let mut plan = Plan::rounded(network, set, format, spreads);
         let deviation = measure(&mut plan, &inputs, &truths);
         // Written so that NaN fails.
         if deviation.worst <= limit || format == Format::F32 {

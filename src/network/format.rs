@@ -66,12 +66,12 @@ impl Format {
         }
     }
 
-    /// Is each number rounded with regard to the others of its row? With 16 bits there is nothing to gain.
+    /// Is each number rounded with regard to the others of its row? With 16 bits there is nothing to gain: their sums leave out as much.
     pub(super) fn is_rounded_together(self) -> bool {
         matches!(self, Self::I12 | Self::I8)
     }
 
-    /// What a layer takes in this one's place if its roundings cannot make up for one another.
+    /// What a layer takes in this one's place of whose inputs nothing is known: the first.
     pub(super) fn unrelated(self) -> Self {
         match self {
             Self::I8 => Self::I12,

@@ -73,6 +73,11 @@ impl InstructionSet {
         Self::Portable
     }
 
+    /// Do weights of 12 bits take less room than those of 16?
+    pub(super) fn packs_12_bits(self) -> bool {
+        self == Self::Avx512Vnni
+    }
+
     /// Name as printed.
     pub fn name(self) -> &'static str {
         match self {

@@ -3,7 +3,7 @@
 //! Activations become `scale * (256 * high + low)` with one scale for the whole vector; `high` and `low` are stored as unsigned bytes,
 //! 128 too large, as the instruction wants one unsigned operand. What the 128 adds to a sum, it adds for every input alike: it is in
 //! the number that each sum starts from. Weights that are larger have a second digit, of eight bits or of four; the product of both low
-//! digits is left out: it is zero on average and below what rounding the weights did.
+//! digits is left out: it is zero on average and no more than what rounding the weights did.
 //!
 //! A tile is sixteen outputs by four inputs: a cache line of high digits, and one of low digits, or half of one that it shares with its
 //! neighbour. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.

@@ -2,7 +2,7 @@
 //!
 //! One place for what every party must set alike: service names, queue depths, the number of peers, and where the shared files
 //! live. The settings are made here, in code, so that no configuration file in some working directory can change them.
-//! After `open`, [`Writer::loan`], [`Writer::send`], [`Reader::drain`] and [`Reader::latest`] allocate nothing, lock nothing and make
+//! After `open`, [`Writer::prepare`], [`Writer::loan`], [`Writer::send`], [`Reader::drain`] and [`Reader::latest`] allocate nothing, lock nothing and make
 //! no system call, but for the one call in which a new peer appears (it is mapped then).
 //!
 //! This module contains `unsafe`: reading the clock and sleeping until a time.

@@ -12,7 +12,7 @@ use training::data::{self, Reading};
 const SECONDS: f64 = 60.0;
 
 #[test]
-fn shipped_models_in_the_format_that_the_service_takes_are_as_exact_on_a_run_as_it_says() {
+fn shipped_models_in_small_weights_stay_within_the_services_limit_on_a_run() {
     let folder = Folder::new("weights");
     let files = runs(&folder, 1, SECONDS, ".mcap");
     for name in ["raven2-worn.onnx", "raven2-worn-orientation.onnx"] {
