@@ -48,7 +48,7 @@ enum Command {
         /// CSV to write
         #[arg(long)]
         out: PathBuf,
-        /// Weight format
+        /// Weight format: f32, f16, bf16, i16, i12 or i8
         #[arg(long, default_value = "f32")]
         weights: String,
         /// The rows are states in the order of time, one per period: a model with a memory remembers from row to row
