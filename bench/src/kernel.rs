@@ -218,19 +218,19 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
     let usual = inputs(network);
     let mut all = Vec::new();
     let name = |plan: &Plan| format!("  ravenpose {}, {}", plan.format(), plan.instruction_set().name());
-    // One floor for what is stored in as many bytes, in front of the first of them.
-    let mut floors: Vec<(u64, usize)> = Vec::new();
+    // One floor for what is stored in as many bytes, to a fiftieth, in front of the first of them.
+    let mut floors: Vec<(usize, usize)> = Vec::new();
     for format in [Format::F32, Format::F16, Format::I16, Format::I12, Format::I8] {
         let mut sets = vec![InstructionSet::best(), InstructionSet::Avx2.available()];
         sets.extend((format == Format::I16).then_some(InstructionSet::Portable));
         sets.dedup();
         for set in sets {
             let plan = Plan::with(network, set, format);
-            let size = (plan.bytes() as f64 / 1e4).round() as u64;
-            let floor = floors.iter().find(|(of, _)| *of == size).map_or(all.len(), |(_, floor)| *floor);
+            let bytes = plan.bytes();
+            let floor = floors.iter().find(|(of, _)| 50 * of.abs_diff(bytes) < bytes).map_or(all.len(), |(_, floor)| *floor);
             if floor == all.len() {
-                floors.push((size, floor));
-                let title = format!("floor: read {:.2} MB once", size as f64 / 100.0);
+                floors.push((bytes, floor));
+                let title = format!("floor: read {:.2} MB once", bytes as f64 / 1e6);
                 all.push(Contender::new(title, Engine::Floor(Box::new(plan.clone())), floor, &usual));
             }
             all.push(Contender::new(name(&plan), Engine::Plan(Box::new(plan)), floor, &usual));
