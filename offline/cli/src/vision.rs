@@ -61,9 +61,9 @@ pub(crate) enum Wish {
         /// Frames of the scene per second
         #[arg(long, default_value_t = 15.0)]
         frames_per_s: f64,
-        /// Program for webcams, and for videos other than AVI of Motion JPEG
-        #[arg(long, default_value = "ffmpeg")]
-        ffmpeg: PathBuf,
+        /// Program for videos other than AVI of Motion JPEG, ffmpeg by itself; given, also for webcams, which are read directly otherwise
+        #[arg(long)]
+        ffmpeg: Option<PathBuf>,
     },
     /// Click the markers in the images, on a page of this machine; markers.csv is written with each click
     Mark {
@@ -100,7 +100,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         Wish::Calibrate { rig, out, paper } => calibrate(rig, out, mode(*paper)),
         Wish::Track { cameras, scene, out, paper, overlay } => track(cameras, scene, out, mode(*paper), overlay.as_deref()),
         Wish::Record { sources, rig, out, seconds, frames_per_s, ffmpeg } => {
-            record(sources, rig, out, *seconds, *frames_per_s, ffmpeg)
+            record(sources, rig, out, *seconds, *frames_per_s, ffmpeg.as_deref())
         }
         Wish::Mark { rig, images, port } => mark(rig, images.as_deref(), *port),
         Wish::Render { run, out, scene, seed, seconds } => render(run, out, scene, *seed, *seconds),
@@ -200,7 +200,7 @@ impl Source for Recorded {
         {
             complain!("{}: {}: {}; images before it are there", self.path.display(), damage.place, damage.what);
         }
-        Ok(image.map(|image| Shot { t_s: image.time_ns as f64 / 1e9, jpeg: image.jpeg }))
+        Ok(image.map(|image| Shot { t_s: image.time_ns as f64 / 1e9, taken_ns: None, jpeg: image.jpeg }))
     }
 
     fn since_1970(&self) -> bool {
@@ -214,7 +214,7 @@ fn record(
     out: &Path,
     seconds: Option<f64>,
     frames_per_s: f64,
-    ffmpeg: &Path,
+    ffmpeg: Option<&Path>,
 ) -> Result<ExitCode, String> {
     let rig = ::vision::rig::read(rig).map_err(|error| error.to_string())?;
     let names: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();

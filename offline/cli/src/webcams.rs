@@ -25,9 +25,9 @@ pub(crate) struct Wish {
     /// Images per second
     #[arg(long, default_value_t = 15.0)]
     frames_per_s: f64,
-    /// Program that reads webcams
-    #[arg(long, default_value = "ffmpeg")]
-    ffmpeg: PathBuf,
+    /// Program that reads webcams which send no Motion JPEG; their images are stamped when they come
+    #[arg(long)]
+    ffmpeg: Option<PathBuf>,
 }
 
 /// An image on its way to the disk.
@@ -124,7 +124,7 @@ impl Webcams {
                     outcome: Arc::clone(&outcome),
                 };
                 // On its own: a camera that hangs holds nobody up.
-                std::thread::spawn(move || thread.run(&path, &ffmpeg, size_px, frames_per_s, &opened));
+                std::thread::spawn(move || thread.run(&path, ffmpeg.as_deref(), size_px, frames_per_s, &opened));
                 (name, is_open, outcome)
             })
             .collect();
@@ -182,7 +182,14 @@ struct Thread {
 }
 
 impl Thread {
-    fn run(&self, path: &Path, ffmpeg: &Path, size_px: [u32; 2], frames_per_s: f64, opened: &SyncSender<Result<(), String>>) {
+    fn run(
+        &self,
+        path: &Path,
+        ffmpeg: Option<&Path>,
+        size_px: [u32; 2],
+        frames_per_s: f64,
+        opened: &SyncSender<Result<(), String>>,
+    ) {
         let source = video::open(path, ffmpeg, size_px, frames_per_s).map_err(|error| error.to_string());
         let (source, said) = match source {
             Ok(source) => (Some(source), Ok(())),
@@ -201,7 +208,7 @@ impl Thread {
     fn watch(&self, mut source: Box<dyn video::Source>) -> Option<String> {
         loop {
             let next = source.next();
-            let time_ns = self.clock.stamp(ravenpose_transport::now_ns());
+            let came_ns = ravenpose_transport::now_ns();
             // Held until the image is handed over: what is counted at the end is with the writer by then.
             let mut outcome = locked(&self.outcome);
             if self.stop.load(Ordering::Relaxed) {
@@ -215,6 +222,7 @@ impl Thread {
             if !self.begin.load(Ordering::Relaxed) {
                 continue;
             }
+            let time_ns = self.clock.stamp(shot.taken_ns.unwrap_or(came_ns));
             outcome.nothing_until(time_ns);
             let image = Image { camera: self.camera, time_ns, number: outcome.images + 1, jpeg: shot.jpeg };
             match self.images.try_send(image) {

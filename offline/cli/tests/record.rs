@@ -9,6 +9,7 @@ use ravenpose_wire::{CorrectedPose, RavenState};
 use recordings::mcap_file::{ImageSource, McapSource};
 use recordings::stream::{Record, Source};
 use stalls::despite_stops;
+use std::ffi::OsString;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -18,6 +19,8 @@ use std::time::{Duration, Instant};
 struct World {
     folder: PathBuf,
     settings: Settings,
+    /// More of the recorder's environment.
+    more: Vec<(&'static str, OsString)>,
 }
 
 impl World {
@@ -26,13 +29,14 @@ impl World {
         std::fs::create_dir_all(&folder).expect("folder");
         let settings =
             Settings { prefix: format!("rprec{name}{}_", std::process::id()), root: format!("{}/iceoryx2/", folder.display()) };
-        Self { folder, settings }
+        Self { folder, settings, more: Vec::new() }
     }
 
     fn record(&self, out: &Path, seconds: Option<&str>, more: &[&str]) -> Child {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ravenpose"));
         command.args(["record", "--out"]).arg(out).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.env("RAVENPOSE_PREFIX", &self.settings.prefix).env("RAVENPOSE_ROOT", &self.settings.root);
+        command.envs(self.more.iter().map(|(name, value)| (name, value)));
         if let Some(seconds) = seconds {
             command.args(["--seconds", seconds]);
         }
@@ -326,6 +330,104 @@ fn images_of_webcams_are_on_the_clock_of_the_states_and_become_a_scene() {
         let first = ImageSource::open(&out, "cam0").expect("images").next_image().expect("image").expect("image").time_ns;
         assert!((start - first as f64 / 1e9).abs() < 1.0, "{start} {first}");
         assert!(frames.lines().count() > 10, "{frames}");
+    });
+}
+
+/// Puts webcams without hardware into the recorder: `common/webcam.c`, which is `what`. `None` after saying why not.
+fn with_webcams(world: &mut World, what: &str) -> Option<()> {
+    let library = world.folder.join("webcam.so");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/common/webcam.c");
+    let mut compiler = Command::new("cc");
+    compiler.args(["-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-o"]).args([&library, &source]).args(["-ldl", "-lpthread"]);
+    match compiler.status() {
+        Ok(status) => assert!(status.success(), "{status}"),
+        Err(error) => {
+            println!("skipped: no C compiler for the webcam: cc: {error}");
+            return None;
+        }
+    }
+    let mut jpeg = Vec::new();
+    let picture = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(3 * x + y) as u8]));
+    image::codecs::jpeg::JpegEncoder::new(&mut jpeg).encode_image(&picture).expect("image");
+    std::fs::write(world.folder.join("image.jpg"), jpeg).expect("file");
+    world.more = vec![
+        ("LD_PRELOAD", library.into()),
+        ("RAVENPOSE_WEBCAM_JPEG", world.folder.join("image.jpg").into()),
+        ("RAVENPOSE_WEBCAM_LOG", world.folder.join("stamps").into()),
+        ("RAVENPOSE_WEBCAM_IS", what.into()),
+    ];
+    Some(())
+}
+
+const TWO_WEBCAMS: [&str; 8] = [
+    "--camera",
+    "cam0=/dev/ravenpose-webcam0",
+    "--camera",
+    "cam1=/dev/ravenpose-webcam1",
+    "--image-size",
+    "64x48",
+    "--frames-per-s",
+    "20",
+];
+
+#[test]
+fn images_of_webcams_are_whole_and_have_the_kernels_stamps() {
+    for what in ["whole", "lossy"] {
+        despite_stops(|| {
+            let mut world = World::new(what);
+            let Some(()) = with_webcams(&mut world, what) else { return };
+            let out = world.folder.join("run.mcap");
+            let (code, said, _) = world.recorded(&out, "3", &TWO_WEBCAMS);
+            assert!(code.is_some_and(|code| code < 2), "{said}");
+            let states = states_of(&out);
+            // Of the recorder's clock to the monotonic one.
+            let ahead_ns = Record::State(Box::new(states[0])).time_ns() - states[0].source_time_ns;
+            let log = std::fs::read_to_string(world.folder.join("stamps")).expect("stamps");
+            let jpeg = std::fs::read(world.folder.join("image.jpg")).expect("image");
+            for camera in 0..2 {
+                let stamps: Vec<i64> = log
+                    .lines()
+                    .filter_map(|line| line.strip_prefix(&format!("{camera} ")))
+                    .map(|line| line.split(' ').nth(1).and_then(|stamp| stamp.parse().ok()).expect("a stamp"))
+                    .collect();
+                let mut images = ImageSource::open(&out, &format!("cam{camera}")).expect("images");
+                let all: Vec<_> = std::iter::from_fn(|| images.next_image().expect("image")).collect();
+                assert!(all.len() >= 10 && all.windows(2).all(|pair| pair[0].time_ns < pair[1].time_ns), "{said}");
+                for image in &all {
+                    assert!(stamps.contains(&(image.time_ns - ahead_ns)), "{} is no stamp", image.time_ns);
+                    assert!(image.jpeg == jpeg, "an image of {} bytes", image.jpeg.len());
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn webcams_that_cannot_do_what_is_asked_are_one_line() {
+    for (what, words) in [
+        ("yuyv", "it sends no Motion JPEG; give --ffmpeg ffmpeg"),
+        ("large", "it sends 128x48 px instead of 64x48"),
+        ("blind", "it takes no images"),
+    ] {
+        let mut world = World::new(what);
+        let Some(()) = with_webcams(&mut world, what) else { return };
+        let out = world.folder.join("run.mcap");
+        let (code, said) = said(world.record(&out, Some("1"), &TWO_WEBCAMS));
+        assert!(code == Some(2) && said.trim().lines().count() == 1 && said.contains(words), "{code:?} {said}");
+        assert!(said.contains("/dev/ravenpose-webcam") && !out.exists() && !out.with_extension("mcap.part").exists());
+    }
+}
+
+#[test]
+fn a_webcam_that_is_unplugged_does_not_stop_the_recording() {
+    despite_stops(|| {
+        let mut world = World::new("unplugged");
+        let Some(()) = with_webcams(&mut world, "unplugged") else { return };
+        let out = world.folder.join("run.mcap");
+        let (code, said, _) = world.recorded(&out, "3", &TWO_WEBCAMS[..2]);
+        assert!(code == Some(1) && said.contains("ended early") && said.contains("it was unplugged"), "{code:?} {said}");
+        let states = states_of(&out);
+        assert!(states.last().expect("states").source_time_ns - states[0].source_time_ns > 1_500_000_000);
     });
 }
 

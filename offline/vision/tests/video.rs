@@ -51,7 +51,7 @@ fn easy() -> Option<(PathBuf, Rig)> {
 }
 
 fn opened(path: &Path) -> Result<Box<dyn Source>> {
-    open(path, Path::new("/nowhere/ffmpeg"), [1280, 720], 15.0)
+    open(path, Some(Path::new("/nowhere/ffmpeg")), [1280, 720], 15.0)
 }
 
 /// The one line of an error, which has to hold some words.
@@ -96,12 +96,12 @@ fn other_videos_go_through_the_program() {
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("script");
     };
     script(&format!("cat {}", own.0.join("made.avi").display()));
-    let source = open(&video, &program, rig.size_px, 15.0).expect("a video");
+    let source = open(&video, Some(&program), rig.size_px, 15.0).expect("a video");
     let made =
         record(&rig, vec![Some(source), None, None, None], 15.0, None, &own.0.join("scene"), &mut |_, _| {}).expect("recorded");
     assert_eq!((made.frames, made.images), (2, vec![2, 0, 0, 0]));
     script("echo 'first words' >&2; echo 'Invalid data found' >&2; exit 1");
-    line(open(&video, &program, rig.size_px, 15.0), &["clip.mp4", "Invalid data found"]);
+    line(open(&video, Some(&program), rig.size_px, 15.0), &["clip.mp4", "Invalid data found"]);
     line(opened(&video), &["clip.mp4", "/nowhere/ffmpeg", "install ffmpeg"]);
     std::fs::write(&video, avi(&images(&scene, 0, 1), 15, *b"H264")).expect("file");
     line(opened(&video), &["clip.mp4", "install ffmpeg"]);
@@ -167,7 +167,7 @@ impl Source for Fake {
             self.next_s = self.silent_s[1];
             return self.next();
         }
-        Ok(Some(Shot { t_s, jpeg: self.jpeg.clone() }))
+        Ok(Some(Shot { t_s, taken_ns: None, jpeg: self.jpeg.clone() }))
     }
 
     fn live(&self) -> bool {

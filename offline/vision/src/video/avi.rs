@@ -116,7 +116,7 @@ impl<R: Read + Send> Source for Avi<R> {
                 match jpeg {
                     // Nothing: the image before is shown once more, which is no measurement.
                     Some(jpeg) if jpeg.is_empty() => Some(()),
-                    Some(jpeg) => return Ok(Some(Shot { t_s, jpeg })),
+                    Some(jpeg) => return Ok(Some(Shot { t_s, taken_ns: None, jpeg })),
                     None => None,
                 }
             } else {

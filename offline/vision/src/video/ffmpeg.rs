@@ -1,4 +1,4 @@
-//! Other videos and webcams through the program ffmpeg, as Motion JPEG on a pipe.
+//! Other videos, and webcams that send no Motion JPEG, through the program ffmpeg, as Motion JPEG on a pipe.
 
 use super::avi::Avi;
 use super::{Shot, Source};
@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Made of whatever comes, with all of its colours.
+const JPEG: [&str; 6] = ["-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj444p"];
 
 struct Piped {
     path: PathBuf,
@@ -21,16 +24,19 @@ struct Piped {
 /// A video file of any format.
 pub(super) fn file(path: &Path, program: &Path) -> Result<Box<dyn Source>> {
     let name = path.display().to_string();
-    start(path, program, &["-i", &name, "-an", "-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj444p"], false)
+    let mut arguments = vec!["-i", &name, "-an"];
+    arguments.extend(JPEG);
+    start(path, program, &arguments, false)
 }
 
-/// A webcam: its own JPEG images, untouched.
+/// A webcam that sends no Motion JPEG: JPEG is made of what it sends.
 pub(super) fn webcam(path: &Path, program: &Path, [w, h]: [u32; 2], frames_per_s: f64) -> Result<Box<dyn Source>> {
     let (name, size, rate) = (path.display().to_string(), format!("{w}x{h}"), format!("{frames_per_s}"));
-    let input = ["-f", "v4l2", "-input_format", "mjpeg", "-video_size", &size, "-framerate", &rate, "-i", &name];
+    let input = ["-f", "v4l2", "-video_size", &size, "-framerate", &rate, "-i", &name];
     let mut arguments = vec!["-fflags", "nobuffer"];
     arguments.extend(input);
-    arguments.extend(["-c:v", "copy", "-flush_packets", "1"]);
+    arguments.extend(JPEG);
+    arguments.extend(["-flush_packets", "1"]);
     start(path, program, &arguments, true)
 }
 
