@@ -108,7 +108,7 @@ NEIGHBOUR_MINUTES ?= 3
 bench-neighbours: build
 	target/release/ravenpose-bench neighbours $(NEIGHBOUR_MINUTES)
 
-# Half an hour of the service with memory and disk busy, 100 idle clients and faults in what it is sent; fails on a wrong answer, a loss
+# Half an hour of the service with memory and disk busy, 126 idle clients and faults in what it is sent; fails on a wrong answer, a loss
 # or a page fault. SOAK_MINUTES=N for another time.
 SOAK_MINUTES ?= 30
 bench-soak: build

@@ -5,7 +5,7 @@ use crate::path::{PERIOD_NS, WARM_UP, World, state};
 use crate::table::{Table, quantiles};
 use ravenpose::check;
 use ravenpose::cycle::Limits;
-use ravenpose_transport::{Reader, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{Message as _, Reader, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag};
 use std::io::{Seek as _, Write as _};
 use std::path::Path;
@@ -13,8 +13,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
-/// Clients that connect and never read.
-const IDLE: usize = 100;
+/// Clients that connect and never read: all places but that of the client that judges, and one for whoever looks on.
+const IDLE: usize = CorrectedPose::MAX_READERS - 2;
 /// Messages that wait for them.
 const IDLE_DEPTH: usize = 4;
 /// Memory that is streamed: more than any cache.
