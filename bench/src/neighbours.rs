@@ -2,9 +2,10 @@
 //! turn, block by block, so that what the machine does falls on all alike.
 
 use crate::path::{PATIENCE_NS, PERIOD_NS, World, state};
+use crate::soak::IDLE;
 use crate::table::{Table, quantiles};
 use ravenpose::realtime;
-use ravenpose_transport::{Bell, Message as _, Reader, Settings, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -28,7 +29,7 @@ const DEPTH: usize = 64;
 #[derive(Clone, Copy, PartialEq)]
 enum Condition {
     Quiet,
-    /// Every place but the robot's taken by clients that never read.
+    /// As many clients that never read as in the soak.
     Idle,
     /// Clients that come, take a pose and leave, one after the other.
     ClientsLeave,
@@ -170,14 +171,9 @@ fn disturb(
             if world.ended() {
                 return Err(format!("the service ended by itself: {}", world.last_words()));
             }
-            let idle: Vec<_> = match conditions[place] {
-                // The robot has one place, and one is for whoever looks on.
-                Condition::Idle => {
-                    (2..CorrectedPose::MAX_READERS).map(|_| Reader::<CorrectedPose>::open(settings, DEPTH)).collect()
-                }
-                _ => Vec::new(),
-            };
-            let idle = idle.into_iter().collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())?;
+            let idle = if conditions[place] == Condition::Idle { IDLE } else { 0 };
+            let idle = (0..idle).map(|_| Reader::<CorrectedPose>::open(settings, DEPTH)).collect::<Result<Vec<_>, _>>();
+            let idle = idle.map_err(|error| error.to_string())?;
             std::thread::sleep(BETWEEN);
             holds.store(place, Relaxed);
             let end = Instant::now() + BLOCK;

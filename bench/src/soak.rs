@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 /// Clients that connect and never read: all places but that of the client that judges, and one for whoever looks on.
-const IDLE: usize = CorrectedPose::MAX_READERS - 2;
+pub(crate) const IDLE: usize = CorrectedPose::MAX_READERS - 2;
 /// Messages that wait for them.
 const IDLE_DEPTH: usize = 4;
 /// Memory that is streamed: more than any cache.
