@@ -163,7 +163,8 @@ const REMOVED: f64 = 0.95;
 const OF_A_MODEL: f64 = 0.05;
 /// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
 const ABOUT: f64 = 0.4;
-/// An effect that gains less than so many times what is asked has to leave less of what was held out, too.
+/// An effect that gains less than so many times what is asked has to leave less of what was held out, too; and a memory, whose many
+/// numbers find something in most of what they are fitted to, always.
 const BARELY: f64 = 3.0;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
@@ -341,7 +342,7 @@ fn analyse_with(
     let held_dictionary = Dictionary::new(&held_problem);
     let mut estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
     if let [only] = answer.effects.as_slice()
-        && only.gain.nats < BARELY * options.thresholds.nats
+        && (only.gain.nats < BARELY * options.thresholds.nats || !only.chosen.candidate.family.limits.is_empty())
         && !verdicts::hold_up(&problem, &held_dictionary, (&answer.effects, &estimates), &floors)
     {
         answer.withdraw();

@@ -57,6 +57,22 @@ fn supposed(physics: &str, form: &str, name: &str) -> f64 {
     if physics == "payload" && form == AT_THE_TIP && name.starts_with("c_") { SUPPOSED_M } else { 0.0 }
 }
 
+/// What a parameter can be: an interval does not reach beyond.
+fn possible(physics: &str, name: &str) -> [f64; 2] {
+    match (physics, name) {
+        ("cable_hysteresis", "a") => [0.0, 1.0],
+        ("cable_hysteresis", "g") => [0.5, 1.0],
+        ("cable_hysteresis", "n") => [1.0, f64::INFINITY],
+        ("cable_hysteresis", "z_m" | "k")
+        | ("cable_stretch", "k")
+        | ("cable_creep", "T_k")
+        | ("thermal_drift", "T")
+        | ("stribeck_friction", "v_s" | "a")
+        | ("pulley_eccentricity", "period") => [0.0, f64::INFINITY],
+        _ => [f64::NEG_INFINITY, f64::INFINITY],
+    }
+}
+
 /// How far a parameter is from no effect; of a direction, the whole of it.
 fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
     match (physics, named.name) {
@@ -149,7 +165,11 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
                     let half = (reach * spread(&|r| r.0[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
-                    (named.clone(), [named.value - half, named.value + half])
+                    let [least, most] = possible(physics, named.name);
+                    (
+                        named.clone(),
+                        [(named.value - half).max(least.min(named.value)), (named.value + half).min(most.max(named.value))],
+                    )
                 })
                 .collect();
             let window = candidate.window.map(|window| {
@@ -174,13 +194,7 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
         if step.is_none() || rounds(family.shape[k]) {
             continue;
         }
-        let step = 1e-3 * candidate.shape[k].abs().max(1e-4);
-        let at = |sign: f64| {
-            let mut shape = candidate.shape.clone();
-            shape[k] += sign * step;
-            Candidate::new(dictionary, family, &shape, candidate.window)
-        };
-        all.push((Slope::Shape(k), difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
+        all.push((Slope::Shape(k), slope(dictionary, candidate, theta, k)));
     }
     for edge in 0..2 {
         let Some(window) = candidate.window.filter(|window| window[edge].is_finite()) else { continue };
@@ -194,6 +208,19 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
     }
     all.retain(|(_, column)| !column.is_empty());
     all
+}
+
+/// Change of the effect per unit of a number of its shape.
+pub(crate) fn slope(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], k: usize) -> Column {
+    let family = &candidate.family;
+    let span = family.limits.get(k).map_or(0.0, |limits| limits[1] - limits[0]);
+    let step = (1e-3 * candidate.shape[k].abs()).max(1e-7).max(1e-4 * span);
+    let at = |sign: f64| {
+        let mut shape = candidate.shape.clone();
+        shape[k] += sign * step;
+        Candidate::new(dictionary, family, &shape, candidate.window)
+    };
+    difference(&at(1.0), &at(-1.0), theta, 2.0 * step)
 }
 
 fn difference(there: &Candidate, here: &Candidate, theta: &[f64], step: f64) -> Column {

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, TOOL_TWIST};
+use crate::hypothesis::{Candidate, OWN_STIFFNESS, TOOL_TWIST};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -98,13 +98,19 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             let lost: f64 = theta[..theta.len() - 2].iter().sum();
             vec![named("a", "1", (1.0 - lost).clamp(0.0, 1.0))]
         }
-        ("cable_hysteresis", _) => vec![
-            named("a", "1", shaped("a")),
-            named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0]),
-            named("z_m", position, shaped("yield") * theta[0]),
-            named("n", "1", shaped("n")),
-            named("g", "1", 0.5),
-        ],
+        ("cable_hysteresis", form) => {
+            let (straight, compliance) = match form {
+                OWN_STIFFNESS => (1.0 - theta[0], nominal.compliance[joint][0]),
+                _ => (shaped("a"), theta[0]),
+            };
+            vec![
+                named("a", "1", straight),
+                named("k", unit("N.m/rad", "N/m"), 1.0 / compliance),
+                named("z_m", position, shaped("yield") * compliance),
+                named("n", "1", shaped("n")),
+                named("g", "1", shaped("g")),
+            ]
+        }
         ("cable_creep", _) => vec![named("J_k", unit("rad/(N.m)", "m/N"), theta[0]), named("T_k", "s", shaped("T_k"))],
         ("joint_coupling", _) => vec![named("c_ij", unit("rad/rad", "m/rad"), theta[0])],
         ("joint_offset", _) => vec![named("o", position, theta[0])],

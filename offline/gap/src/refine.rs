@@ -77,22 +77,28 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
                 step *= 0.5;
             }
         }
-        for edge in 0..2 {
-            let Some(window) = best.window.filter(|window| window[edge].is_finite()) else { continue };
-            let mut step = EDGE_S * window[edge].clamp(1.0, 8.0);
-            for _ in 0..HALVINGS + 2 {
-                for sign in [-1.0, 1.0] {
-                    let mut moved = best.window.unwrap_or(window);
-                    moved[edge] += sign * step;
-                    if moved[0] < moved[1] && moved[edge] > 0.0 {
-                        try_one(Candidate::new(dictionary, family, &best.shape, Some(moved)), &mut best, &mut least, misfit);
-                    }
-                }
-                step *= 0.5;
-            }
-        }
+        edges_moved(dictionary, &mut best, &mut least, misfit);
     }
     best
+}
+
+/// The edges of a window moved to where the misfit is least.
+pub fn edges_moved(dictionary: &Dictionary, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {
+    let family = best.family.clone();
+    for edge in 0..2 {
+        let Some(window) = best.window.filter(|window| window[edge].is_finite()) else { continue };
+        let mut step = EDGE_S * window[edge].clamp(1.0, 8.0);
+        for _ in 0..HALVINGS + 2 {
+            for sign in [-1.0, 1.0] {
+                let mut moved = best.window.unwrap_or(window);
+                moved[edge] += sign * step;
+                if moved[0] < moved[1] && moved[edge] > 0.0 {
+                    try_one(Candidate::new(dictionary, &family, &best.shape, Some(moved)), best, least, misfit);
+                }
+            }
+            step *= 0.5;
+        }
+    }
 }
 
 fn try_one(candidate: Candidate, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {

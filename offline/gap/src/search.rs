@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, UNMODELLED, WALL, Window, library, rounds};
+use crate::intervals::slope;
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
-use crate::refine::{refined, starts};
+use crate::refine::{Fitted, edges_moved, refined, starts};
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -59,6 +60,13 @@ const SAME_FORM: f64 = 0.01;
 
 /// Share of the best claim's score from which on a rival begins again with its rounding.
 const ROUNDED: f64 = 0.2;
+
+/// Most steps of a shape whose numbers are refined at once, and the gain of one after which there is no other, nats.
+const STEPS: usize = 25;
+const ENOUGH: f64 = 0.05;
+/// Starts of such a shape, per form of a claim, and share of what the best claim sees that a claim has to see to be refined from them.
+const MANY: usize = 4;
+const SEEN_OF_BEST: f64 = 0.3;
 
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
@@ -311,11 +319,68 @@ impl Search<'_, '_> {
     }
 
     fn refined(&self, base: &Grams, candidate: &Candidate) -> Candidate {
+        if !candidate.family.limits.is_empty() {
+            return self.refined_at_once(base, candidate);
+        }
         refined(self.dictionary, candidate, &|candidate| {
             let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
             let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
             (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
         })
+    }
+
+    /// All refinable numbers of a shape together (Gauss and Newton, in steps that lead down): those of a memory depend on each
+    /// other, and one after the other they stop on the way.
+    fn refined_at_once(&self, base: &Grams, start: &Candidate) -> Candidate {
+        let fitted = |candidate: &Candidate| {
+            let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
+            let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+            (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
+        };
+        let mut best = start.clone();
+        self.descend(base, &mut best, &fitted);
+        if best.edges() > 0 {
+            let (mut least, _) = fitted(&best);
+            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| fitted(candidate).0);
+            self.descend(base, &mut best, &fitted);
+        }
+        best
+    }
+
+    /// Steps of a shape, each of which is better than the one before.
+    fn descend(&self, base: &Grams, best: &mut Candidate, fitted: &Fitted) {
+        let family = best.family.clone();
+        let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
+        let span = |k: usize| family.limits[k][1] - family.limits[k][0];
+        let (mut least, mut theta) = fitted(best);
+        for _ in 0..STEPS {
+            let mut columns = best.columns.to_vec();
+            columns.extend(free.iter().map(|k| slope(self.dictionary, best, &theta, *k)));
+            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
+            let moves = &fit.coefficients[fit.coefficients.len() - free.len()..];
+            // No further at once than a third of what a number can be.
+            let furthest = free.iter().zip(moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
+            if !furthest.is_finite() {
+                return;
+            }
+            let whole = (0.33 / furthest.max(1e-12)).min(1.0);
+            let told = family.follow.as_ref().map_or_else(|| best.shape.clone(), |follow| follow(&best.shape, &theta));
+            let there = [1.0, 0.4, 0.12, 0.03].into_iter().find_map(|part| {
+                let mut shape: Vec<f64> = best.shape.iter().zip(&told).map(|(here, there)| here + part * (there - here)).collect();
+                for (k, by) in free.iter().zip(moves) {
+                    shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
+                }
+                let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
+                let (misfit, own) = if candidate.shows() { fitted(&candidate) } else { return None };
+                (misfit < least).then_some((candidate, misfit, own))
+            });
+            let Some((candidate, misfit, own)) = there else { return };
+            let done = least - misfit < ENOUGH;
+            (*best, least, theta) = (candidate, misfit, own);
+            if done {
+                return;
+            }
+        }
     }
 
     /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
@@ -372,6 +437,8 @@ impl Search<'_, '_> {
         let windows = self.windows();
         all.sort_by(|a, b| b.seen.total_cmp(&a.seen));
         let mut worth: Vec<Scored> = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.seen > 3.0).collect();
+        let refined = self.refined_often(grams, &base, &all);
+        all.extend(refined);
         sort(&mut all);
         let mut claims = distinct(&all);
         for scored in claims.iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.gain.nats > 3.0) {
@@ -399,6 +466,7 @@ impl Search<'_, '_> {
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
+        claims.extend(self.refined_often_in_windows(grams, &base, &claims));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         let mut claims = distinct(&claims);
@@ -420,6 +488,61 @@ impl Search<'_, '_> {
         self.told_apart(others, &mut claims);
         parsimonious(&mut claims, self.thresholds.equal, self.problem.robot.joint_count() - 1);
         claims
+    }
+
+    /// Shapes whose numbers depend on each other, refined from several starts, where the claim may be the best: from one they stop at
+    /// the next hill.
+    fn refined_often(&self, grams: &Grams, base: &Fit, all: &[Scored]) -> Vec<Scored> {
+        let most = all.iter().map(|s| s.seen).fold(0.0, f64::max);
+        let worth = |c: &Candidate| all.iter().any(|s| s.candidate.same_claim(c) && s.seen > (SEEN_OF_BEST * most).max(3.0));
+        self.refined_starts(grams, base, &worth, None)
+    }
+
+    /// The same in the windows of the best claims, at their joints.
+    fn refined_often_in_windows(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
+        let mut tried: Vec<&Candidate> = Vec::new();
+        for Scored { candidate, .. } in claims.iter().take(MANY).filter(|s| s.score > self.thresholds.nats) {
+            if candidate.window.is_some() && !tried.iter().any(|other| other.shares_edge(candidate)) {
+                tried.push(candidate);
+            }
+        }
+        let found = |best: &&Candidate| {
+            let there = |c: &Candidate| c.family.joints.first() == best.family.joints.first();
+            self.refined_starts(grams, base, &there, best.window)
+        };
+        tried.iter().flat_map(found).collect()
+    }
+
+    fn refined_starts(&self, grams: &Grams, base: &Fit, worth: &dyn Fn(&Candidate) -> bool, window: Option<Window>) -> Vec<Scored> {
+        let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
+        let mut starts: Vec<Scored> = candidates
+            .map(|c| window.map_or_else(|| c.clone(), |window| c.within(self.problem, window)))
+            .filter(Candidate::shows)
+            .filter_map(|candidate| self.score(grams, base, &candidate))
+            .collect();
+        starts.sort_by(|a, b| b.seen.total_cmp(&a.seen));
+        let mut kept: Vec<Scored> = Vec::new();
+        for start in starts {
+            if kept.iter().filter(|other| other.candidate.same_form(&start.candidate)).count() < MANY {
+                kept.push(start);
+            }
+        }
+        let refine = |part: &mut [Scored]| part.iter_mut().for_each(|scored| self.settle_shape(grams, base, scored));
+        let half = kept.len() / 2;
+        let (left, right) = kept.split_at_mut(half);
+        std::thread::scope(|scope| {
+            let other = scope.spawn(|| refine(right));
+            refine(left);
+            other.join().expect("no panic in refining");
+        });
+        // With the stiffness of the simulation it is the same claim with a number less.
+        let enough = |scored: &Scored| {
+            let simpler = kept.iter().filter(|other| complexity(&other.candidate) < complexity(&scored.candidate));
+            simpler
+                .filter(|other| other.candidate.same_claim(&scored.candidate))
+                .any(|other| other.score >= (1.0 - SAME_FORM) * scored.score)
+        };
+        kept.iter().filter(|scored| !enough(scored)).cloned().collect()
     }
 
     /// Everything once more in the window that was found with the best claim: the grid of windows takes each claim in the form
@@ -556,8 +679,11 @@ fn price(candidate: &Candidate) -> f64 {
 
 /// Claims that hold another one and more, in these forms (all, where none is named), and the share of its score by which they
 /// have to be better.
-const HOLDS: [(&str, &[&str], &str, f64); 2] =
-    [("link_inertia", &[], "payload", 0.03), (UNMODELLED, &HARDENING, "cable_stretch", 0.02)];
+const HOLDS: [(&str, &[&str], &str, f64); 3] = [
+    ("link_inertia", &[], "payload", 0.03),
+    (UNMODELLED, &HARDENING, "cable_stretch", 0.02),
+    ("cable_hysteresis", &[], "cable_stretch", 0.01),
+];
 
 /// The share by which a claim has to be better than one that it holds; none where it holds it not.
 fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {

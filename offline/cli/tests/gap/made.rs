@@ -1,6 +1,6 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
-use crate::common::{Case, Folder, done, made, named, near, primary, report, text, wanted, with_effect, written};
+use crate::common::{Case, Folder, done, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
 use gap_report::{Report, Status};
 use generator::order::{Kind, Order, Wanted};
 use std::path::Path;
@@ -36,6 +36,21 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
     let report = case.judged(&folder.file("out"));
     assert_ne!(report.status, Status::NoMismatch, "{}", report.summary);
     assert!(report.mismatch.detected && !primary(&report).is_empty());
+}
+
+#[test]
+fn hysteresis_as_large_as_the_noise_is_told_from_a_zero_that_is_off() {
+    // Under a weight of one sign most of it is constant. Loading and unloading bend nearly alike in the second.
+    for (g, label) in [(0.55, "bent-1"), (0.8, "bent-2")] {
+        let folder = Folder::new(label);
+        let shape = [("a", 0.75), ("k", 1700.0), ("z_m", 0.0023), ("n", 1.4), ("g", g)];
+        let (case, truth) = made(&folder, label, &[wanted("cable_hysteresis", Some(1), &shape)], 12.0);
+        let report = case.judged(&folder.file("out"));
+        let first = named(&report, "cable_hysteresis", truth[0].joint_name.as_ref().expect("a joint"));
+        near(first, "a", 0.75, 0.15);
+        let (_, [low, high]) = parameter(first, "g");
+        assert!((0.5..=1.0).contains(&low) && low < high && high <= 1.0, "{low} to {high}");
+    }
 }
 
 #[test]

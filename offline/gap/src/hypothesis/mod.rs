@@ -10,6 +10,7 @@ mod timing;
 mod transmission;
 mod unknown;
 
+pub(crate) use transmission::OWN_STIFFNESS;
 pub(crate) use unknown::HARDENING;
 pub use unknown::UNMODELLED;
 
@@ -41,6 +42,9 @@ pub enum Bound {
 /// Columns for a shape.
 type Columns = dyn Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync;
 
+/// A shape with the numbers that follow the coefficients fitted to it.
+pub type Follow = dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync;
+
 /// Numbers that follow another: the shape before, and the one to be tried.
 pub type Carry = dyn Fn(&[f64], &mut [f64]) + Send + Sync;
 
@@ -61,6 +65,8 @@ pub struct Family {
     /// First step of the numbers that are refined between the grid's; none for those that are choices. NaN: half the
     /// distance to the grid's next.
     pub steps: Vec<Option<f64>>,
+    /// Between which values the numbers of its shape lie; none: each number is searched for itself, wherever it leads.
+    pub limits: Vec<[f64; 2]>,
     /// Are the columns secants from 0 to the shape, so that the fit's own first coefficients are the next shape?
     pub secant: bool,
     /// One per coefficient.
@@ -69,6 +75,8 @@ pub struct Family {
     pub penalty_nats: f64,
     /// What the other numbers of its shape follow when one is refined.
     pub carry: Option<Arc<Carry>>,
+    /// Numbers of its shape that its coefficients tell.
+    pub follow: Option<Arc<Follow>>,
     columns: Arc<Columns>,
 }
 
@@ -96,10 +104,12 @@ impl Family {
             shape: Vec::new(),
             grid: vec![Vec::new()],
             steps: Vec::new(),
+            limits: Vec::new(),
             secant: false,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             carry: None,
+            follow: None,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
         }
     }
@@ -123,11 +133,13 @@ impl Family {
             channel,
             shape: shape.iter().map(|s| s.0).collect(),
             steps: shape.iter().map(|s| s.1.then_some(f64::NAN)).collect(),
+            limits: Vec::new(),
             secant: false,
             grid,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             carry: None,
+            follow: None,
             columns: Arc::new(columns),
         }
     }
@@ -151,6 +163,20 @@ impl Family {
     #[must_use]
     pub fn stepped(mut self, steps: &[Option<f64>]) -> Self {
         self.steps = steps.to_vec();
+        self
+    }
+
+    /// With limits of its numbers, which then are refined all at once.
+    #[must_use]
+    pub fn limited(mut self, limits: &[[f64; 2]]) -> Self {
+        self.limits = limits.to_vec();
+        self
+    }
+
+    /// With numbers that the coefficients tell: of a shape and its coefficients, the shape that agrees with them.
+    #[must_use]
+    pub fn following(mut self, follow: impl Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync + 'static) -> Self {
+        self.follow = Some(Arc::new(follow));
         self
     }
 

@@ -14,10 +14,18 @@ const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
 const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
-/// Shares of the straight spring in a Bouc-Wen element.
-const STRAIGHT: [f64; 3] = [0.3, 0.6, 0.85];
-/// Yield load over RMS load.
-const YIELD: [f64; 3] = [0.1, 0.3, 0.8];
+/// Bouc-Wen elements to begin with: shares of the straight spring, the same where its stiffness is known, yield loads over the RMS
+/// load, exponents, what the memory holds at the start (over what it can hold), and how alike loading and unloading bend.
+const STRAIGHT: [f64; 2] = [0.3, 0.7];
+const STRAIGHT_OWN: [f64; 2] = [0.5, 0.85];
+const YIELD: [f64; 4] = [0.12, 0.35, 0.9, 1.8];
+const POWER: [f64; 1] = [1.4];
+const HELD: [f64; 2] = [0.0, 0.9];
+const ALIKE: [f64; 2] = [0.5, 0.85];
+/// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
+const MOST_ALIKE: f64 = 0.93;
+/// Bouc-Wen, the cable as stiff as in the simulation.
+pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness";
 /// Time constants of creep, s.
 const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
 /// Periods of an eccentric pulley, from and to as shares of the travel, and how many.
@@ -147,6 +155,9 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
         vec![d.strain_of(j, d.load(j))]
     }));
+    let numbers = |a: bool| [("a", a), ("yield", true), ("n", true), ("start", true), ("g", true)];
+    let yields = YIELD.map(|share| share * usual);
+    let limits = [[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [-1.0, 1.0], [0.5, MOST_ALIKE]];
     all.push(
         Family::shaped(
             "cable_hysteresis",
@@ -154,15 +165,41 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             "Bouc-Wen",
             TRANSMISSION,
             &[Bound::Positive, Bound::Free],
-            &[("a", true), ("yield", true), ("n", false), ("start", true)],
-            product(&[&STRAIGHT, &YIELD.map(|share| share * usual), &[1.0, 2.0], &[0.01, 0.6]]),
+            &numbers(true),
+            product(&[&STRAIGHT, &yields, &POWER, &HELD, &ALIKE]),
             move |d, s| {
                 let load = d.load(j);
                 vec![d.strain_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.strain_of(j, load)]
             },
         )
+        .limited(&limits)
         .penalised(3.0),
     );
+    let own = dictionary.problem.nominal.compliance[j][0];
+    if own > 0.0 {
+        // The coefficient is the share that yields: near the share for which a column is made, the deflection goes with it.
+        let family = Family::shaped(
+            "cable_hysteresis",
+            &[j],
+            OWN_STIFFNESS,
+            TRANSMISSION,
+            &[Bound::Between(0.0, limits[0][1])],
+            &numbers(false),
+            product(&[&STRAIGHT_OWN, &yields, &POWER, &HELD, &ALIKE]),
+            move |d, s| {
+                let load = d.load(j);
+                let per_share = own / (1.0 - s[0]);
+                let beyond = |run: &[f64]| bouc_wen(run, s).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect();
+                vec![d.strain_of(j, per_run(d, &load, beyond))]
+            },
+        );
+        let follow = move |s: &[f64], theta: &[f64]| {
+            let mut shape = s.to_vec();
+            shape[0] = (1.0 - theta[0]).clamp(limits[0][0], limits[0][1]);
+            shape
+        };
+        all.push(family.limited(&limits).following(follow).penalised(3.0));
+    }
     for (form, settled) in [("settled at the start", true), ("fresh at the start", false)] {
         all.push(
             Family::shaped(
@@ -281,21 +318,21 @@ fn remembered(deflection: &[f64], p: f64, q: f64) -> Vec<f64> {
     out.split_off(settle)
 }
 
-/// Deflection times stiffness of a Bouc-Wen element (g = 0.5) under a load, where `load = a x + (1 - a) z`. Shape: a, yield
-/// load, n, and the share of the load that z carries at the start, which nobody knows.
+/// Deflection times stiffness of a Bouc-Wen element under a load, where `load = a x + (1 - a) z`. Shape: a, yield load, n, the
+/// share of its yield load that z holds at the start (of the load's sign), which nobody knows, and g.
 fn bouc_wen(load: &[f64], shape: &[f64]) -> Vec<f64> {
-    let (straight, yields, power) = (shape[0].clamp(0.02, 0.98), shape[1].max(1e-9), shape[2]);
+    let [straight, yields, power, held, alike] = *shape else { return load.to_vec() };
     let first = load.first().copied().unwrap_or(0.0);
-    let mut z = (shape[3] * first / (1.0 - straight)).clamp(-yields, yields);
+    let mut z = held.clamp(-1.0, 1.0) * yields * first.signum();
     let mut x = (first - (1.0 - straight) * z) / straight;
     let mut before = first;
     load.iter()
         .map(|&now| {
             let step = (now - before) / 8.0;
             for _ in 0..8 {
-                // zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z))): loading bends, unloading is straight.
-                let bend = if step.signum() * z > 0.0 { (z.abs() / yields).powf(power) } else { 0.0 };
-                let slope = 1.0 - bend;
+                // zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z)))
+                let bend = if step * z >= 0.0 { 1.0 } else { 2.0 * alike - 1.0 };
+                let slope = 1.0 - (z.abs() / yields).powf(power) * bend;
                 let dx = step / (straight + (1.0 - straight) * slope);
                 x += dx;
                 z = (z + slope * dx).clamp(-yields, yields);
