@@ -6,7 +6,7 @@ use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, UNMODELLED, WA
 use crate::intervals::slope;
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
-use crate::refine::{Fitted, edges_moved, refined, starts};
+use crate::refine::{edges_moved, refined, starts};
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -322,37 +322,35 @@ impl Search<'_, '_> {
         if !candidate.family.limits.is_empty() {
             return self.refined_at_once(base, candidate);
         }
-        refined(self.dictionary, candidate, &|candidate| {
-            let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
-            let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
-            (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
-        })
+        refined(self.dictionary, candidate, &|candidate| self.fitted(base, candidate))
+    }
+
+    /// Misfit of a candidate beside the rest, infinite where its coefficients may not be, and these.
+    fn fitted(&self, base: &Grams, candidate: &Candidate) -> (f64, Vec<f64>) {
+        let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
+        let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+        (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
     }
 
     /// All refinable numbers of a shape together (Gauss and Newton, in steps that lead down): those of a memory depend on each
     /// other, and one after the other they stop on the way.
     fn refined_at_once(&self, base: &Grams, start: &Candidate) -> Candidate {
-        let fitted = |candidate: &Candidate| {
-            let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
-            let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
-            (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
-        };
         let mut best = start.clone();
-        self.descend(base, &mut best, &fitted);
+        self.descend(base, &mut best);
         if best.edges() > 0 {
-            let (mut least, _) = fitted(&best);
-            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| fitted(candidate).0);
-            self.descend(base, &mut best, &fitted);
+            let (mut least, _) = self.fitted(base, &best);
+            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| self.fitted(base, candidate).0);
+            self.descend(base, &mut best);
         }
         best
     }
 
     /// Steps of a shape, each of which is better than the one before.
-    fn descend(&self, base: &Grams, best: &mut Candidate, fitted: &Fitted) {
+    fn descend(&self, base: &Grams, best: &mut Candidate) {
         let family = best.family.clone();
         let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
-        let (mut least, mut theta) = fitted(best);
+        let (mut least, mut theta) = self.fitted(base, best);
         for _ in 0..STEPS {
             let mut columns = best.columns.to_vec();
             columns.extend(free.iter().map(|k| slope(self.dictionary, best, &theta, *k)));
@@ -371,7 +369,7 @@ impl Search<'_, '_> {
                     shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
                 }
                 let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
-                let (misfit, own) = if candidate.shows() { fitted(&candidate) } else { return None };
+                let (misfit, own) = if candidate.shows() { self.fitted(base, &candidate) } else { return None };
                 (misfit < least).then_some((candidate, misfit, own))
             });
             let Some((candidate, misfit, own)) = there else { return };

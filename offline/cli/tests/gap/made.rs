@@ -29,6 +29,18 @@ fn what_barely_gains_and_makes_the_held_out_run_worse_is_not_said() {
 }
 
 #[test]
+fn a_spike_at_a_standstill_is_no_friction_curve() {
+    // An alarm on a null of a sealed set: a curve 0.15 mrad/s wide and 67 N m high, 79 nats.
+    let folder = Folder::new("spike");
+    let orders = generator::matrix::named("small", 1_830_933_757).expect("the small matrix");
+    let order = orders.iter().find(|order| order.id() == "85c3f6f5ae62").expect("the case");
+    let (case, truth) = written(&folder, order);
+    assert!(truth.is_empty());
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+}
+
+#[test]
 fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
     let folder = Folder::new("wall");
     let wall = Wanted { physics: "external_contact".to_owned(), severity: Some(10.0), ..Wanted::default() };

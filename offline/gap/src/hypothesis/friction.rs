@@ -12,6 +12,8 @@ type Turn = fn(&Dictionary, usize, usize, &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
+/// Least Stribeck speed over the RMS speed: a narrower curve is a spike at a standstill, whose height nothing tells.
+const STRIBECK_LEAST: f64 = 0.01;
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
 const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
 /// Exponents of the Stribeck curve.
@@ -105,11 +107,14 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), positive, by_speed as Turn);
     let starts = product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]);
     let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, Bound::UpTo(STATIC_EXCESS), by_travel as Turn);
+    let least = STRIBECK_LEAST * speed;
     for (names, starts, excess, sign) in [speeds, bristles] {
         let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
         all.push(
             Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {
-                let extra = d.smoothed(|r| stribeck(d, r, j, s, sign));
+                let mut shape = s.to_vec();
+                shape[0] = shape[0].max(least);
+                let extra = d.smoothed(|r| stribeck(d, r, j, &shape, sign));
                 vec![d.effort_of(j, smooth(d, j, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
             })
             .penalised(3.0),
