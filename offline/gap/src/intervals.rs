@@ -1,6 +1,6 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Window, rounds};
+use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, Window, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
@@ -58,8 +58,10 @@ fn supposed(physics: &str, form: &str, name: &str) -> f64 {
 }
 
 /// What a parameter can be: an interval does not reach beyond.
-fn possible(physics: &str, name: &str) -> [f64; 2] {
+fn possible(physics: &str, form: &str, name: &str) -> [f64; 2] {
     match (physics, name) {
+        // The law of a spring to the ground may bend the other way: of a Bouc-Wen element in these numbers, z_m is negative then.
+        ("cable_hysteresis", _) if form == GROUND => [f64::NEG_INFINITY, f64::INFINITY],
         ("cable_hysteresis", "a") => [0.0, 1.0],
         ("cable_hysteresis", "g") => [0.5, 1.0],
         ("cable_hysteresis", "n") => [1.0, f64::INFINITY],
@@ -165,7 +167,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
                     let half = (reach * spread(&|r| r.0[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
-                    let [least, most] = possible(physics, named.name);
+                    let [least, most] = possible(physics, form, named.name);
                     (
                         named.clone(),
                         [(named.value - half).max(least.min(named.value)), (named.value + half).min(most.max(named.value))],

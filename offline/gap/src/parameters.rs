@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, OWN_STIFFNESS, TOOL_TWIST};
+use crate::hypothesis::{Candidate, GROUND, OWN_STIFFNESS, TOOL_TWIST};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -82,7 +82,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("backlash", "follows the motion") => vec![named("b", position, shaped("b"))],
         ("backlash", _) => vec![named("b", position, theta[0])],
         ("cable_stretch", _) => vec![named("k", unit("N.m/rad", "N/m"), 1.0 / theta[0])],
-        ("cable_hysteresis", "to the ground") => {
+        ("cable_hysteresis", GROUND) => {
             let (p, q) = (shaped("p"), shaped("p") * shaped("q_over_p"));
             let stiffness = robot.drives[joint].ground[0] + theta[0] + theta[1];
             vec![

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family};
+use crate::hypothesis::{Candidate, Dictionary, Family, GROUND};
 
 /// Halvings of a step before a number is settled.
 const HALVINGS: usize = 7;
@@ -49,7 +49,7 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
     // Sharp and long valleys: memories that the motion shows in every sample.
-    let rounds = if family.form == "to the ground" {
+    let rounds = if family.form == GROUND {
         SHARP_ROUNDS
     } else if free.len() + best.edges() > 1 {
         ROUNDS

@@ -24,6 +24,8 @@ const HELD: [f64; 2] = [0.0, 0.9];
 const ALIKE: [f64; 2] = [0.5, 0.85];
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
 const MOST_ALIKE: f64 = 0.93;
+/// A spring to the ground whose force has a memory.
+pub(crate) const GROUND: &str = "to the ground";
 /// Bouc-Wen, the cable as stiff as in the simulation.
 pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness";
 /// Time constants of creep, s.
@@ -278,7 +280,7 @@ fn push_ground(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let family = Family::shaped(
         "cable_hysteresis",
         &[j],
-        "to the ground",
+        GROUND,
         Channel::JointTorque,
         &[Bound::Positive, Bound::Free],
         &[("p", true), ("q_over_p", true)],
