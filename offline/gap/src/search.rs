@@ -1,12 +1,13 @@
 //! Which candidates explain the residuals: forward, then swap and drop (gap-design.md, section 7).
 
+mod at_once;
+
 use std::sync::Arc;
 
 use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, UNMODELLED, WALL, Window, library, rounds};
-use crate::intervals::slope;
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
-use crate::refine::{edges_moved, refined, starts};
+use crate::refine::{refined, starts};
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -60,13 +61,6 @@ const SAME_FORM: f64 = 0.01;
 
 /// Share of the best claim's score from which on a rival begins again with its rounding.
 const ROUNDED: f64 = 0.2;
-
-/// Most steps of a shape whose numbers are refined at once, and the gain of one after which there is no other, nats.
-const STEPS: usize = 25;
-const ENOUGH: f64 = 0.05;
-/// Starts of such a shape, per form of a claim, and share of what the best claim sees that a claim has to see to be refined from them.
-const MANY: usize = 4;
-const SEEN_OF_BEST: f64 = 0.3;
 
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
@@ -332,55 +326,6 @@ impl Search<'_, '_> {
         (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
     }
 
-    /// All refinable numbers of a shape together (Gauss and Newton, in steps that lead down): those of a memory depend on each
-    /// other, and one after the other they stop on the way.
-    fn refined_at_once(&self, base: &Grams, start: &Candidate) -> Candidate {
-        let mut best = start.clone();
-        self.descend(base, &mut best);
-        if best.edges() > 0 {
-            let (mut least, _) = self.fitted(base, &best);
-            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| self.fitted(base, candidate).0);
-            self.descend(base, &mut best);
-        }
-        best
-    }
-
-    /// Steps of a shape, each of which is better than the one before.
-    fn descend(&self, base: &Grams, best: &mut Candidate) {
-        let family = best.family.clone();
-        let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
-        let span = |k: usize| family.limits[k][1] - family.limits[k][0];
-        let (mut least, mut theta) = self.fitted(base, best);
-        for _ in 0..STEPS {
-            let mut columns = best.columns.to_vec();
-            columns.extend(free.iter().map(|k| slope(self.dictionary, best, &theta, *k)));
-            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
-            let moves = &fit.coefficients[fit.coefficients.len() - free.len()..];
-            // No further at once than a third of what a number can be.
-            let furthest = free.iter().zip(moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
-            if !furthest.is_finite() {
-                return;
-            }
-            let whole = (0.33 / furthest.max(1e-12)).min(1.0);
-            let told = family.follow.as_ref().map_or_else(|| best.shape.clone(), |follow| follow(&best.shape, &theta));
-            let there = [1.0, 0.4, 0.12, 0.03].into_iter().find_map(|part| {
-                let mut shape: Vec<f64> = best.shape.iter().zip(&told).map(|(here, there)| here + part * (there - here)).collect();
-                for (k, by) in free.iter().zip(moves) {
-                    shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
-                }
-                let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
-                let (misfit, own) = if candidate.shows() { self.fitted(base, &candidate) } else { return None };
-                (misfit < least).then_some((candidate, misfit, own))
-            });
-            let Some((candidate, misfit, own)) = there else { return };
-            let done = least - misfit < ENOUGH;
-            (*best, least, theta) = (candidate, misfit, own);
-            if done {
-                return;
-            }
-        }
-    }
-
     /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
     fn settle(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Vec<Effect> {
         let mut effects = Vec::new();
@@ -488,61 +433,6 @@ impl Search<'_, '_> {
         claims
     }
 
-    /// Shapes whose numbers depend on each other, refined from several starts, where the claim may be the best: from one they stop at
-    /// the next hill.
-    fn refined_often(&self, grams: &Grams, base: &Fit, all: &[Scored]) -> Vec<Scored> {
-        let most = all.iter().map(|s| s.seen).fold(0.0, f64::max);
-        let worth = |c: &Candidate| all.iter().any(|s| s.candidate.same_claim(c) && s.seen > (SEEN_OF_BEST * most).max(3.0));
-        self.refined_starts(grams, base, &worth, None)
-    }
-
-    /// The same in the windows of the best claims, at their joints.
-    fn refined_often_in_windows(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
-        let mut tried: Vec<&Candidate> = Vec::new();
-        for Scored { candidate, .. } in claims.iter().take(MANY).filter(|s| s.score > self.thresholds.nats) {
-            if candidate.window.is_some() && !tried.iter().any(|other| other.shares_edge(candidate)) {
-                tried.push(candidate);
-            }
-        }
-        let found = |best: &&Candidate| {
-            let there = |c: &Candidate| c.family.joints.first() == best.family.joints.first();
-            self.refined_starts(grams, base, &there, best.window)
-        };
-        tried.iter().flat_map(found).collect()
-    }
-
-    fn refined_starts(&self, grams: &Grams, base: &Fit, worth: &dyn Fn(&Candidate) -> bool, window: Option<Window>) -> Vec<Scored> {
-        let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
-        let mut starts: Vec<Scored> = candidates
-            .map(|c| window.map_or_else(|| c.clone(), |window| c.within(self.problem, window)))
-            .filter(Candidate::shows)
-            .filter_map(|candidate| self.score(grams, base, &candidate))
-            .collect();
-        starts.sort_by(|a, b| b.seen.total_cmp(&a.seen));
-        let mut kept: Vec<Scored> = Vec::new();
-        for start in starts {
-            if kept.iter().filter(|other| other.candidate.same_form(&start.candidate)).count() < MANY {
-                kept.push(start);
-            }
-        }
-        let refine = |part: &mut [Scored]| part.iter_mut().for_each(|scored| self.settle_shape(grams, base, scored));
-        let half = kept.len() / 2;
-        let (left, right) = kept.split_at_mut(half);
-        std::thread::scope(|scope| {
-            let other = scope.spawn(|| refine(right));
-            refine(left);
-            other.join().expect("no panic in refining");
-        });
-        // With the stiffness of the simulation it is the same claim with a number less.
-        let enough = |scored: &Scored| {
-            let simpler = kept.iter().filter(|other| complexity(&other.candidate) < complexity(&scored.candidate));
-            simpler
-                .filter(|other| other.candidate.same_claim(&scored.candidate))
-                .any(|other| other.score >= (1.0 - SAME_FORM) * scored.score)
-        };
-        kept.iter().filter(|scored| !enough(scored)).cloned().collect()
-    }
-
     /// Everything once more in the window that was found with the best claim: the grid of windows takes each claim in the form
     /// that fits the whole of the runs best, and some are not tried in windows of their own.
     fn in_the_window_of_the_first(&self, claims: &[Scored], grams: &Grams, base: &Fit) -> Vec<Scored> {
@@ -559,13 +449,7 @@ impl Search<'_, '_> {
         for scored in &mut forms {
             self.settle_shape(grams, base, scored);
         }
-        // A form of the same claim that fits fewer numbers is enough where it does as well.
-        let enough = |form: &Scored| {
-            let simpler = |other: &&Scored| complexity(&other.candidate) < complexity(&form.candidate);
-            let mut same = claims.iter().chain(&forms).filter(|other| other.candidate.same_claim(&form.candidate)).filter(simpler);
-            same.any(|other| other.score >= (1.0 - SAME_FORM) * form.score)
-        };
-        forms.iter().filter(|form| !enough(form)).cloned().collect()
+        forms.iter().filter(|form| !simpler_is_enough(form, claims.iter().chain(&forms))).cloned().collect()
     }
 
     /// How a sign turns round belongs to the joint and not to the law: rivals of the best claim, which round otherwise and do worse, begin
@@ -723,6 +607,15 @@ pub(crate) fn complexity(candidate: &Candidate) -> f64 {
     // What rounds a sign is not a claim of its own.
     let rounding = candidate.family.shape.iter().filter(|name| rounds(name)).count();
     (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
+}
+
+/// Is there a form of the same claim that fits fewer numbers and does as well?
+fn simpler_is_enough<'s>(form: &Scored, all: impl IntoIterator<Item = &'s Scored>) -> bool {
+    all.into_iter().any(|other| {
+        other.candidate.same_claim(&form.candidate)
+            && complexity(&other.candidate) < complexity(&form.candidate)
+            && other.score >= (1.0 - SAME_FORM) * form.score
+    })
 }
 
 fn sort(all: &mut [Scored]) {

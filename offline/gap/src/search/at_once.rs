@@ -1,0 +1,114 @@
+//! Shapes whose numbers are refined all at once: those of a memory depend on each other.
+
+use super::{Scored, Search, simpler_is_enough};
+use crate::hypothesis::{Candidate, Window};
+use crate::intervals::slope;
+use crate::refine::edges_moved;
+use crate::score::{Fit, Grams};
+
+/// Most steps of a shape whose numbers are refined at once, and the gain of one after which there is no other, nats.
+const STEPS: usize = 25;
+const ENOUGH: f64 = 0.05;
+/// Starts of such a shape, per form of a claim, and share of what the best claim sees that a claim has to see to be refined from them.
+const MANY: usize = 4;
+const SEEN_OF_BEST: f64 = 0.3;
+
+impl Search<'_, '_> {
+    /// All refinable numbers of a shape together (Gauss and Newton, in steps that lead down): those of a memory depend on each
+    /// other, and one after the other they stop on the way.
+    pub(super) fn refined_at_once(&self, base: &Grams, start: &Candidate) -> Candidate {
+        let mut best = start.clone();
+        self.descend(base, &mut best);
+        if best.edges() > 0 {
+            let (mut least, _) = self.fitted(base, &best);
+            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| self.fitted(base, candidate).0);
+            self.descend(base, &mut best);
+        }
+        best
+    }
+
+    /// Steps of a shape, each of which is better than the one before.
+    fn descend(&self, base: &Grams, best: &mut Candidate) {
+        let family = best.family.clone();
+        let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
+        let span = |k: usize| family.limits[k][1] - family.limits[k][0];
+        let (mut least, mut theta) = self.fitted(base, best);
+        for _ in 0..STEPS {
+            let mut columns = best.columns.to_vec();
+            columns.extend(free.iter().map(|k| slope(self.dictionary, best, &theta, *k)));
+            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
+            let moves = &fit.coefficients[fit.coefficients.len() - free.len()..];
+            // No further at once than a third of what a number can be.
+            let furthest = free.iter().zip(moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
+            if !furthest.is_finite() {
+                return;
+            }
+            let whole = (0.33 / furthest.max(1e-12)).min(1.0);
+            let told = family.follow.as_ref().map_or_else(|| best.shape.clone(), |follow| follow(&best.shape, &theta));
+            let there = [1.0, 0.4, 0.12, 0.03].into_iter().find_map(|part| {
+                let mut shape: Vec<f64> = best.shape.iter().zip(&told).map(|(here, there)| here + part * (there - here)).collect();
+                for (k, by) in free.iter().zip(moves) {
+                    shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
+                }
+                let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
+                let (misfit, own) = if candidate.shows() { self.fitted(base, &candidate) } else { return None };
+                (misfit < least).then_some((candidate, misfit, own))
+            });
+            let Some((candidate, misfit, own)) = there else { return };
+            let done = least - misfit < ENOUGH;
+            (*best, least, theta) = (candidate, misfit, own);
+            if done {
+                return;
+            }
+        }
+    }
+
+    /// Shapes whose numbers depend on each other, refined from several starts, where the claim may be the best: from one they stop at
+    /// the next hill.
+    pub(super) fn refined_often(&self, grams: &Grams, base: &Fit, all: &[Scored]) -> Vec<Scored> {
+        let most = all.iter().map(|s| s.seen).fold(0.0, f64::max);
+        let worth = |c: &Candidate| all.iter().any(|s| s.candidate.same_claim(c) && s.seen > (SEEN_OF_BEST * most).max(3.0));
+        self.refined_starts(grams, base, &worth, None)
+    }
+
+    /// The same in the windows of the best claims, at their joints.
+    pub(super) fn refined_often_in_windows(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
+        let mut tried: Vec<&Candidate> = Vec::new();
+        for Scored { candidate, .. } in claims.iter().take(MANY).filter(|s| s.score > self.thresholds.nats) {
+            if candidate.window.is_some() && !tried.iter().any(|other| other.shares_edge(candidate)) {
+                tried.push(candidate);
+            }
+        }
+        let found = |best: &&Candidate| {
+            let there = |c: &Candidate| c.family.joints.first() == best.family.joints.first();
+            self.refined_starts(grams, base, &there, best.window)
+        };
+        tried.iter().flat_map(found).collect()
+    }
+
+    fn refined_starts(&self, grams: &Grams, base: &Fit, worth: &dyn Fn(&Candidate) -> bool, window: Option<Window>) -> Vec<Scored> {
+        let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
+        let mut starts: Vec<Scored> = candidates
+            .map(|c| window.map_or_else(|| c.clone(), |window| c.within(self.problem, window)))
+            .filter(Candidate::shows)
+            .filter_map(|candidate| self.score(grams, base, &candidate))
+            .collect();
+        starts.sort_by(|a, b| b.seen.total_cmp(&a.seen));
+        let mut kept: Vec<Scored> = Vec::new();
+        for start in starts {
+            if kept.iter().filter(|other| other.candidate.same_form(&start.candidate)).count() < MANY {
+                kept.push(start);
+            }
+        }
+        let refine = |part: &mut [Scored]| part.iter_mut().for_each(|scored| self.settle_shape(grams, base, scored));
+        let half = kept.len() / 2;
+        let (left, right) = kept.split_at_mut(half);
+        std::thread::scope(|scope| {
+            let other = scope.spawn(|| refine(right));
+            refine(left);
+            other.join().expect("no panic in refining");
+        });
+        // With the stiffness of the simulation it is the same claim with a number less.
+        kept.iter().filter(|scored| !simpler_is_enough(scored, &kept)).cloned().collect()
+    }
+}
