@@ -6,6 +6,7 @@ mod service;
 #[path = "common/stalls.rs"]
 mod stalls;
 
+use ravenpose_transport::now_ns;
 use service::{CONFIG, PATIENCE, World, publish_forever, role};
 use stalls::despite_stops;
 use std::os::unix::net::UnixDatagram;
@@ -61,25 +62,43 @@ fn a_stuck_loop_is_no_longer_fed() {
         publish_forever();
     }
     despite_stops(|| {
-        let world = World::new("stuck");
-        // After 200 messages: busy for an hour.
-        let (socket, mut service) = start(&world, &["--test-hook", "200:1:3600000000"]);
-        socket.hear_until("READY=1");
-        let _publisher = world.role("a_stuck_loop_is_no_longer_fed", "publisher");
-        // It ends itself after 200 ms of its own time without a turn, and is not fed meanwhile: systemd would end it too.
-        let begun = Instant::now();
-        let mut last_feed = Instant::now();
-        while service.0.try_wait().expect("status").is_none() {
-            if socket.hear(Duration::from_millis(5)).is_some_and(|text| text.contains("WATCHDOG=1")) {
-                last_feed = Instant::now();
+        let mut soonest = i64::MAX;
+        for round in 0..3 {
+            let world = World::new(&format!("stuck{round}"));
+            // After 200 messages: busy for an hour.
+            let (socket, mut service) = start(&world, &["--test-hook", "200:1:3600000000"]);
+            socket.hear_until("READY=1");
+            let _publisher = world.role("a_stuck_loop_is_no_longer_fed", "publisher");
+            let reader = world.poses();
+            // It ends itself after 200 ms of its own time without a turn, and is not fed meanwhile: systemd would end it too.
+            let begun = Instant::now();
+            let (mut last_feed, mut last_pose_ns) = (Instant::now(), now_ns());
+            while service.0.try_wait().expect("status").is_none() {
+                if socket.hear(Duration::from_millis(1)).is_some_and(|text| text.contains("WATCHDOG=1")) {
+                    last_feed = Instant::now();
+                }
+                while let Some(pose) = reader.next().expect("pose") {
+                    last_pose_ns = pose.publish_time_ns;
+                }
+                assert!(begun.elapsed() < PATIENCE, "a stuck loop goes on\n{}", world.log());
             }
-            assert!(begun.elapsed() < PATIENCE, "a stuck loop goes on\n{}", world.log());
+            // Without rights the loop may be held up by anything, and is given 5 s.
+            if !world.log().contains("NOT REAL TIME") {
+                soonest = soonest.min(now_ns() - last_pose_ns);
+            }
+            let unfed = last_feed.elapsed();
+            println!("ended {} ms after the last feed", unfed.as_millis());
+            assert!(unfed > Duration::from_millis(100), "a stuck loop was fed {unfed:?} before the end");
+            assert_eq!(service.end().signal(), Some(libc::SIGABRT), "{}", world.log());
+            assert!(world.log().contains("the loop is stuck"), "{}", world.log());
         }
-        let unfed = last_feed.elapsed();
-        println!("ended {} ms after the last feed", unfed.as_millis());
-        assert!(unfed > Duration::from_millis(100), "a stuck loop was fed {unfed:?} before the end");
-        assert_eq!(service.end().signal(), Some(libc::SIGABRT), "{}", world.log());
-        assert!(world.log().contains("the loop is stuck"), "{}", world.log());
+        if soonest == i64::MAX {
+            println!("its time is not judged: no real-time rights here");
+            return;
+        }
+        println!("ended {} us after the last pose", soonest / 1000);
+        // F43. The machine may hold up one of them; not all.
+        assert!(soonest <= 250_000_000, "{soonest} ns");
     });
 }
 

@@ -32,7 +32,6 @@ fn without_rights(command: &mut Command) -> &mut Command {
     command.uid(NOBODY).gid(NOBODY)
 }
 
-/// Only root can become somebody else.
 /// The configuration with the copies of [`world`].
 fn config(world: &World, more: &str) -> std::path::PathBuf {
     let path = world.config(more);
@@ -50,6 +49,7 @@ fn service_of(world: &World, config: &std::path::Path) -> Command {
     command
 }
 
+/// Only root can become somebody else.
 fn may_change_user() -> bool {
     // SAFETY: no arguments, no memory.
     let root = unsafe { libc::geteuid() } == 0;
@@ -100,6 +100,39 @@ fn each_missing_right_is_refused_with_one_line_and_its_remedy() {
         }
         assert!(last.contains(what) && last.contains(remedy) && last.contains("allow_degraded = true"), "{last}");
     }
+}
+
+#[test]
+fn a_refused_cpu_dma_latency_alone_is_refused_too() {
+    if !may_change_user() {
+        return;
+    }
+    if !std::path::Path::new("/dev/cpu_dma_latency").exists() {
+        println!("skipped: this kernel has no /dev/cpu_dma_latency");
+        return;
+    }
+    let world = world("latency");
+    let config = config(&world, "allow_untrained = true\n[loop]\nlock_memory = false\nhold_cpu_dma_latency = true");
+    // All that the loop needs but root's way past the device's mode.
+    let mut command = world.command("setpriv");
+    command.args([
+        "--reuid=65534",
+        "--regid=65534",
+        "--clear-groups",
+        "--inh-caps=-all,+sys_nice",
+        "--ambient-caps=-all,+sys_nice",
+    ]);
+    let output = command.arg(world.dir.0.join("ravenposed")).arg("--config").arg(config).output().expect("setpriv of util-linux");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(!text.contains("SCHED_FIFO"), "{text}");
+    let last = text.lines().last().expect("a line");
+    assert!(
+        last.contains("/dev/cpu_dma_latency cannot be opened")
+            && last.contains("DeviceAllow=")
+            && last.contains("allow_degraded = true"),
+        "{last}"
+    );
 }
 
 #[test]

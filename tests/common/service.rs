@@ -4,6 +4,7 @@
 use super::common::{TempDir, remove_shared_memory, untrained};
 use ravenpose_transport::{Reader, Settings, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{CorrectedPose, RavenState};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -24,6 +25,8 @@ pub const CONFIG: &str =
 pub struct World {
     pub dir: TempDir,
     pub settings: Settings,
+    /// More of the environment of its processes.
+    pub more: Vec<(&'static str, OsString)>,
 }
 
 impl World {
@@ -31,7 +34,7 @@ impl World {
         let dir = TempDir::new(name);
         let settings =
             Settings { prefix: format!("rp{name}{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.0.display()) };
-        Self { dir, settings }
+        Self { dir, settings, more: Vec::new() }
     }
 
     /// A configuration with the untrained model on both arms, allowed, in a format that is exact enough, without the time that a choice takes;
@@ -54,6 +57,7 @@ impl World {
     pub fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
         command.env("RAVENPOSE_PREFIX", &self.settings.prefix).env("RAVENPOSE_ROOT", &self.settings.root);
+        command.envs(self.more.iter().map(|(name, value)| (name, value)));
         command
     }
 
