@@ -18,12 +18,12 @@ use std::time::{Duration, Instant};
 /// The arms' names, as the configuration has them.
 pub const NAMES: [&str; ARMS] = ["gold", "green"];
 /// How often the ordinary thread looks.
-pub const TICK: Duration = Duration::from_millis(50);
-/// Ticks without a heartbeat after which the loop is stuck: 200 ms on a real-time machine. Counted in ticks of this thread, so that
+pub const TICK: Duration = Duration::from_millis(30);
+/// Ticks without a heartbeat after which the loop is stuck: 180 ms on a real-time machine. Counted in ticks of this thread, so that
 /// a stop of the whole process is not taken for one.
-const STUCK_TICKS: u32 = 4;
+const STUCK_TICKS: u32 = 6;
 /// The same where the loop has no real-time rights and may be held up by anything.
-const STUCK_TICKS_DEGRADED: u32 = 100;
+const STUCK_TICKS_DEGRADED: u32 = 167;
 /// How often statistics are written and the link is probed.
 const SECOND: Duration = Duration::from_secs(1);
 const REMOVED: &str = "the shared files were removed under the service (RemoveIPC, a tmp cleaner?)";

@@ -13,6 +13,13 @@ use std::os::unix::net::UnixDatagram;
 use std::os::unix::process::ExitStatusExt;
 use std::time::{Duration, Instant};
 
+/// One at a time: each brings several processes, and there are two cores.
+static MACHINE: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
+fn machine() -> std::sync::MutexGuard<'static, ()> {
+    MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
 struct Socket(UnixDatagram);
 
 impl Socket {
@@ -42,6 +49,7 @@ fn start(world: &World, arguments: &[&str]) -> (Socket, service::Process) {
 
 #[test]
 fn ready_then_watchdog_while_the_heartbeat_moves_then_stopping() {
+    let _machine = machine();
     despite_stops(|| {
         let world = World::new("ready");
         let (socket, mut service) = start(&world, &[]);
@@ -61,6 +69,7 @@ fn a_stuck_loop_is_no_longer_fed() {
     if role().as_deref() == Some("publisher") {
         publish_forever();
     }
+    let _machine = machine();
     despite_stops(|| {
         let mut soonest = i64::MAX;
         for round in 0..3 {
@@ -70,7 +79,7 @@ fn a_stuck_loop_is_no_longer_fed() {
             socket.hear_until("READY=1");
             let _publisher = world.role("a_stuck_loop_is_no_longer_fed", "publisher");
             let reader = world.poses();
-            // It ends itself after 200 ms of its own time without a turn, and is not fed meanwhile: systemd would end it too.
+            // It ends itself after 180 ms of its own time without a turn, and is not fed meanwhile: systemd would end it too.
             let begun = Instant::now();
             let (mut last_feed, mut last_pose_ns) = (Instant::now(), now_ns());
             while service.0.try_wait().expect("status").is_none() {
@@ -99,6 +108,40 @@ fn a_stuck_loop_is_no_longer_fed() {
         println!("ended {} us after the last pose", soonest / 1000);
         // F43. The machine may hold up one of them; not all.
         assert!(soonest <= 250_000_000, "{soonest} ns");
+    });
+}
+
+/// F35. Statistics are written aside and renamed; a pipe in that place, which nobody reads, holds up whoever opens it.
+#[test]
+fn a_disk_that_hangs_holds_up_neither_loop_nor_watchdog() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let lasting = std::env::var("RAVENPOSE_HANG_S").ok().and_then(|text| text.parse().ok()).unwrap_or(4);
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("hang");
+        let run = world.dir.0.join("run");
+        std::fs::create_dir(&run).expect("a directory");
+        let pipe = run.join("stats.json.new");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+        let (socket, mut service) = start(&world, &[]);
+        socket.hear_until("READY=1");
+        let _publisher = world.role("a_disk_that_hangs_holds_up_neither_loop_nor_watchdog", "publisher");
+        let reader = world.poses();
+        let (begun, mut poses, mut feeds) = (Instant::now(), 0, 0);
+        while begun.elapsed() < Duration::from_secs(lasting) {
+            feeds += u64::from(socket.hear(Duration::from_millis(5)).is_some_and(|text| text.contains("WATCHDOG=1")));
+            while let Some(pose) = reader.next().expect("pose") {
+                poses += u64::from(pose.arm[0].status == ravenpose_wire::ArmStatus::Valid as u32);
+            }
+        }
+        assert!(!run.join("stats.json").exists(), "the disk does not hang");
+        assert!(poses > 500 * lasting && feeds > 4 * lasting, "{poses} valid poses, {feeds} feeds in {lasting} s");
+        // The end waits for a hanging disk only so long.
+        service.signal(libc::SIGTERM);
+        socket.hear_until("STOPPING=1");
+        assert_eq!(service.end().code(), Some(0), "{}", world.log());
     });
 }
 

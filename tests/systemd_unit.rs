@@ -6,8 +6,8 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_ravenposed");
-/// How often the service looks at the loop's heartbeat (`TICK` in src/service.rs), ms.
-const TICK_MS: u64 = 50;
+/// How often the service looks at the loop's heartbeat (`TICK` in src/watch.rs), ms.
+const TICK_MS: u64 = 30;
 
 fn source(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("systemd").join(name)

@@ -65,7 +65,7 @@ impl Code {
     pub(crate) fn of(error: &TransportError) -> Self {
         match error {
             TransportError::Settings { .. } => Self::Argument,
-            TransportError::Node { .. } | TransportError::Service { .. } => Self::Transport,
+            TransportError::Node { .. } | TransportError::Room { .. } | TransportError::Service { .. } => Self::Transport,
             TransportError::Foreign { .. } => Self::Foreign,
             TransportError::Full { .. } => Self::Full,
             TransportError::Loan { .. } => Self::Loan,

@@ -11,7 +11,7 @@ const STEP_NS: i64 = 2_000_000;
 /// A wake-up later than this is a stop.
 pub(crate) const LATE_NS: i64 = 10_000_000;
 
-/// A stop for which the service's watchdog may end it (200 ms), less what such a thread does not see.
+/// A stop for which the service's watchdog may end it (180 ms), less what such a thread does not see.
 pub(crate) const LONG_NS: i64 = 80_000_000;
 /// Times that a test is run while the machine stops for so long.
 const ATTEMPTS: u32 = 4;

@@ -25,6 +25,18 @@ pub enum TransportError {
         /// iceoryx2's own name for the failure.
         cause: String,
     },
+    /// Shared memory is too full; going on would end in SIGBUS.
+    #[error(
+        "{place} has {free_kib} KiB of free shared memory, {needed_kib} KiB are needed; remove what is not needed there, or: mount -o remount,size=1G {place}"
+    )]
+    Room {
+        /// Where it is mounted.
+        place: &'static str,
+        /// Wanted, KiB.
+        needed_kib: u64,
+        /// Left, KiB.
+        free_kib: u64,
+    },
     /// The service exists but is not ours.
     #[error("service {service} exists with other contents than {expected} ({cause}); stop the program that made it, or update it")]
     Foreign {

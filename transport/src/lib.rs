@@ -10,6 +10,7 @@
 mod error;
 mod event;
 mod link;
+mod room;
 mod settings;
 
 pub use error::TransportError;

@@ -2,6 +2,7 @@
 //!
 //! This module contains `unsafe`: handing over a message that C has written in place.
 
+use crate::room::{self, Room};
 use crate::{Settings, TransportError, now_ns, sleep_until_ns};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
@@ -42,8 +43,25 @@ impl Message for CorrectedPose {
 }
 
 /// Deepest queue that a reader may ask for: 256 ms of messages at 1 kHz, so that a recorder loses none on a machine that stops for as
-/// long. The publisher has room for all of its readers' queues: 4 MB of states, 15 MB of poses.
+/// long. The publisher has room for all of its readers' queues: 4 MB of states, 23 MB of poses.
 pub const DEPTH_MAX: usize = 256;
+/// Messages that a reader may hold.
+const BORROWED_MAX: usize = 2;
+/// Messages that a late reader gets.
+const HISTORY: usize = 1;
+/// Messages that a writer may hold.
+const LOANED_MAX: usize = 2;
+
+/// More than a service, its events, and the queues between its ports take in shared memory beside the messages: a quarter of a MiB, and for
+/// each reader of as many as may come.
+const ROOM_OF_SERVICE: u64 = 256 << 10;
+const ROOM_OF_QUEUE: u64 = 64 << 10;
+
+/// More than the messages of a writer take in shared memory: each has a head.
+const fn room_of_messages<T: Message>() -> u64 {
+    const HEAD: usize = 96;
+    ((T::MAX_READERS * (DEPTH_MAX + BORROWED_MAX) + HISTORY + LOANED_MAX) * (size_of::<T>() + HEAD)) as u64
+}
 
 type Factory<T> = PortFactory<ipc::Service, T, ()>;
 
@@ -56,6 +74,7 @@ struct Opened<T: Message> {
 pub(crate) fn node(settings: &Settings) -> Result<Node<ipc::Service>, TransportError> {
     // The library prints through no logger of its own here; errors travel as values.
     iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
+    room::require(ROOM_OF_SERVICE)?;
     NodeBuilder::new()
         .config(&settings.iceoryx2()?)
         // Signals belong to the program, never to a library in the control process.
@@ -83,9 +102,9 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
             // Overflow drops the oldest: a slow reader never holds the writer up.
             .enable_safe_overflow(true)
             // A late reader gets the last message at once, and tells from its time how old it is.
-            .history_size(1)
+            .history_size(HISTORY)
             .subscriber_max_buffer_size(DEPTH_MAX)
-            .subscriber_max_borrowed_samples(2)
+            .subscriber_max_borrowed_samples(BORROWED_MAX)
             .max_publishers(1)
             .max_subscribers(T::MAX_READERS)
             .max_nodes(T::MAX_READERS + 8)
@@ -149,13 +168,15 @@ impl<T: Message> Writer<T> {
     /// Opens the service and takes its one publisher's place.
     ///
     /// # Errors
-    /// Any [`TransportError`] of opening; [`TransportError::Full`] while another publisher is alive.
+    /// Any [`TransportError`] of opening; [`TransportError::Room`] when shared memory is too full; [`TransportError::Full`] while another publisher is alive.
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        let queues = T::MAX_READERS as u64 * ROOM_OF_QUEUE;
+        let room = Room::ask(settings, ROOM_OF_SERVICE + room_of_messages::<T>() + queues)?;
         let opened = open::<T>(settings)?;
         let publisher = opened
             .service
             .publisher_builder()
-            .max_loaned_samples(2)
+            .max_loaned_samples(LOANED_MAX)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|cause| match cause {
@@ -169,6 +190,7 @@ impl<T: Message> Writer<T> {
                     prefix: settings.prefix.clone(),
                 },
             })?;
+        room.take()?;
         Ok(Self { next: Cell::new(None), publisher, opened })
     }
 
@@ -260,8 +282,9 @@ impl<T: Message> Reader<T> {
     /// Opens the service with a queue of `depth` messages (1 to [`DEPTH_MAX`]); the oldest is dropped when it is full.
     ///
     /// # Errors
-    /// Any [`TransportError`] of opening; [`TransportError::Full`] when all places are taken.
+    /// Any [`TransportError`] of opening; [`TransportError::Room`] when shared memory is too full; [`TransportError::Full`] when all places are taken.
     pub fn open(settings: &Settings, depth: usize) -> Result<Self, TransportError> {
+        let room = Room::ask(settings, ROOM_OF_SERVICE + ROOM_OF_QUEUE)?;
         let opened = open::<T>(settings)?;
         let depth = depth.clamp(1, DEPTH_MAX);
         let subscriber = opened.service.subscriber_builder().buffer_size(depth).create().map_err(|cause| TransportError::Full {
@@ -269,6 +292,7 @@ impl<T: Message> Reader<T> {
             role: "reader",
             cause: format!("{cause:?}"),
         })?;
+        room.take()?;
         Ok(Self { subscriber, opened, depth })
     }
 
@@ -369,5 +393,57 @@ impl Probe {
             let peers = service.dynamic_config();
             (peers.number_of_publishers(), peers.number_of_subscribers())
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iceoryx2::port::update_connections::UpdateConnections as _;
+
+    /// Bytes of the files of a prefix: their lengths, and what was taken of them.
+    fn shared(prefix: &str) -> (u64, u64) {
+        use std::os::unix::fs::MetadataExt;
+        let files = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+        let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(prefix));
+        ours.filter_map(|file| file.metadata().ok())
+            .fold((0, 0), |(length, taken), file| (length + file.len(), taken + 512 * file.blocks()))
+    }
+
+    fn takes_no_more_room_than_it_asks_for<T: Message>() {
+        let folder = std::env::temp_dir().join(format!("ravenpose-room-{}-{}", T::TYPE, std::process::id()));
+        let settings = Settings {
+            prefix: format!("room{}_{}_", std::process::id(), T::MAX_READERS),
+            root: format!("{}/iceoryx2/", folder.display()),
+        };
+        let writer = Writer::<T>::open(&settings).expect("writer");
+        let (alone, taken) = shared(&settings.prefix);
+        assert!(taken >= alone, "{taken} of {alone} bytes are taken");
+        let asked = ROOM_OF_SERVICE + room_of_messages::<T>();
+        assert!((asked / 2..asked).contains(&alone), "{alone} of {asked} bytes");
+        let readers: Vec<_> = (0..T::MAX_READERS).map(|_| Reader::<T>::open(&settings, DEPTH_MAX).expect("reader")).collect();
+        // Whoever comes later makes the queue.
+        writer.publisher.update_connections().expect("connected");
+        let (length, taken) = shared(&settings.prefix);
+        assert!(taken >= length, "{taken} of {length} bytes are taken");
+        let of_queues = ROOM_OF_QUEUE * readers.len() as u64;
+        assert!((alone + of_queues / 8..alone + of_queues).contains(&length), "{} of {of_queues} bytes", length - alone);
+        drop((readers, writer));
+        let _ = std::fs::remove_dir_all(folder);
+        for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if file.file_name().to_string_lossy().starts_with(&settings.prefix) {
+                let _ = std::fs::remove_file(file.path());
+            }
+        }
+    }
+
+    #[test]
+    fn states_take_no_more_room_than_they_ask_for() {
+        takes_no_more_room_than_it_asks_for::<RavenState>();
+    }
+
+    #[test]
+    fn poses_take_no_more_room_than_they_ask_for() {
+        takes_no_more_room_than_it_asks_for::<CorrectedPose>();
     }
 }
