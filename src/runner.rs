@@ -186,6 +186,7 @@ impl<E: Estimator> Runner<E> {
         self.link = None;
         self.shared.heartbeat.fetch_add(1, Relaxed);
         self.link = Some(Link::open(settings, self.waiting.wait)?);
+        self.shared.heartbeat.fetch_add(1, Relaxed);
         self.shared.reopen.store(false, Relaxed);
         self.report(Event::Reopened);
         Ok(())

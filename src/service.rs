@@ -312,7 +312,16 @@ fn spawn_loop(
             }
             let _ = ready.send(Ok(()));
             while runner.run() == Ended::Reopen {
-                while runner.reopen(&config.transport).is_err() && !shared.stop.load(Relaxed) {
+                // Not real time: there is no link.
+                let mut said = String::new();
+                while let Err(error) = runner.reopen(&config.transport)
+                    && !shared.stop.load(Relaxed)
+                {
+                    let text = error.to_string();
+                    if text != said {
+                        say(&format!("the link cannot be opened anew: {text}; it is tried again"));
+                        said = text;
+                    }
                     std::thread::sleep(TICK);
                 }
             }

@@ -2,11 +2,11 @@
 //!
 //! This module contains `unsafe`: handing over a message that C has written in place.
 
-use crate::room::{self, Room};
-use crate::{Settings, TransportError, now_ns, sleep_until_ns};
+use crate::{Settings, TransportError, now_ns, room, sleep_until_ns};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{BackpressureStrategy, ServiceName, SignalHandlingMode, ZeroCopySend, ipc};
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use iceoryx2::service::builder::publish_subscribe::{
@@ -170,9 +170,8 @@ impl<T: Message> Writer<T> {
     /// # Errors
     /// Any [`TransportError`] of opening; [`TransportError::Room`] when shared memory is too full; [`TransportError::Full`] while another publisher is alive.
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
-        let queues = T::MAX_READERS as u64 * ROOM_OF_QUEUE;
-        let room = Room::ask(settings, ROOM_OF_SERVICE + room_of_messages::<T>() + queues)?;
         let opened = open::<T>(settings)?;
+        room::require(ROOM_OF_SERVICE + room_of_messages::<T>() + T::MAX_READERS as u64 * ROOM_OF_QUEUE)?;
         let publisher = opened
             .service
             .publisher_builder()
@@ -190,7 +189,9 @@ impl<T: Message> Writer<T> {
                     prefix: settings.prefix.clone(),
                 },
             })?;
-        room.take()?;
+        // Queues to readers that came at the same moment; what fails here fails again, and is said, when sending.
+        let _ = publisher.update_connections();
+        room::take(settings)?;
         Ok(Self { next: Cell::new(None), publisher, opened })
     }
 
@@ -284,15 +285,17 @@ impl<T: Message> Reader<T> {
     /// # Errors
     /// Any [`TransportError`] of opening; [`TransportError::Room`] when shared memory is too full; [`TransportError::Full`] when all places are taken.
     pub fn open(settings: &Settings, depth: usize) -> Result<Self, TransportError> {
-        let room = Room::ask(settings, ROOM_OF_SERVICE + ROOM_OF_QUEUE)?;
         let opened = open::<T>(settings)?;
         let depth = depth.clamp(1, DEPTH_MAX);
+        room::require(ROOM_OF_SERVICE + ROOM_OF_QUEUE)?;
         let subscriber = opened.service.subscriber_builder().buffer_size(depth).create().map_err(|cause| TransportError::Full {
             service: T::SERVICE,
             role: "reader",
             cause: format!("{cause:?}"),
         })?;
-        room.take()?;
+        // As for the writer.
+        let _ = subscriber.update_connections();
+        room::take(settings)?;
         Ok(Self { subscriber, opened, depth })
     }
 
@@ -399,7 +402,6 @@ impl Probe {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iceoryx2::port::update_connections::UpdateConnections as _;
 
     /// Bytes of the files of a prefix: their lengths, and what was taken of them.
     fn shared(prefix: &str) -> (u64, u64) {
@@ -410,31 +412,37 @@ mod tests {
             .fold((0, 0), |(length, taken), file| (length + file.len(), taken + 512 * file.blocks()))
     }
 
+    /// Files of a link of its own, gone when dropped.
+    struct Own(Settings);
+
+    impl Drop for Own {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0.root);
+            for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+                if file.file_name().to_string_lossy().starts_with(&self.0.prefix) {
+                    let _ = std::fs::remove_file(file.path());
+                }
+            }
+        }
+    }
+
     fn takes_no_more_room_than_it_asks_for<T: Message>() {
-        let folder = std::env::temp_dir().join(format!("ravenpose-room-{}-{}", T::TYPE, std::process::id()));
-        let settings = Settings {
-            prefix: format!("room{}_{}_", std::process::id(), T::MAX_READERS),
-            root: format!("{}/iceoryx2/", folder.display()),
-        };
-        let writer = Writer::<T>::open(&settings).expect("writer");
+        let name = format!("room{}_{}_", std::process::id(), T::MAX_READERS);
+        let root = std::env::temp_dir().join(format!("ravenpose-{name}"));
+        let own = Own(Settings { prefix: name, root: format!("{}/", root.display()) });
+        let settings = &own.0;
+        let writer = Writer::<T>::open(settings).expect("writer");
         let (alone, taken) = shared(&settings.prefix);
         assert!(taken >= alone, "{taken} of {alone} bytes are taken");
         let asked = ROOM_OF_SERVICE + room_of_messages::<T>();
         assert!((asked / 2..asked).contains(&alone), "{alone} of {asked} bytes");
-        let readers: Vec<_> = (0..T::MAX_READERS).map(|_| Reader::<T>::open(&settings, DEPTH_MAX).expect("reader")).collect();
+        let readers: Vec<_> = (0..T::MAX_READERS).map(|_| Reader::<T>::open(settings, DEPTH_MAX).expect("reader")).collect();
         // Whoever comes later makes the queue.
         writer.publisher.update_connections().expect("connected");
         let (length, taken) = shared(&settings.prefix);
         assert!(taken >= length, "{taken} of {length} bytes are taken");
         let of_queues = ROOM_OF_QUEUE * readers.len() as u64;
         assert!((alone + of_queues / 8..alone + of_queues).contains(&length), "{} of {of_queues} bytes", length - alone);
-        drop((readers, writer));
-        let _ = std::fs::remove_dir_all(folder);
-        for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-            if file.file_name().to_string_lossy().starts_with(&settings.prefix) {
-                let _ = std::fs::remove_file(file.path());
-            }
-        }
     }
 
     #[test]

@@ -6,8 +6,6 @@
 use crate::{Settings, TransportError};
 use rustix::fs::{FallocateFlags, Mode, OFlags};
 use rustix::io::Errno;
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
 
 /// Where POSIX shared memory lies on Linux.
 const SHARED: &str = "/dev/shm";
@@ -24,45 +22,34 @@ pub(crate) fn require(bytes: u64) -> Result<(), TransportError> {
     if free < bytes { Err(missing(bytes, free)) } else { Ok(()) }
 }
 
-/// Room that was asked for and is to be taken.
-pub(crate) struct Room {
-    prefix: String,
-    /// Files that are not ours: made earlier, perhaps by programs that leave most of theirs empty.
-    others: HashSet<PathBuf>,
-}
-
-impl Room {
-    /// Asks for so many bytes.
-    pub(crate) fn ask(settings: &Settings, bytes: u64) -> Result<Self, TransportError> {
-        require(bytes)?;
-        Ok(Self { prefix: settings.prefix.clone(), others: files(&settings.prefix).collect() })
-    }
-
-    /// Takes the room of all that was made since, so that no writer meets a full file system later.
-    pub(crate) fn take(self) -> Result<(), TransportError> {
-        for path in files(&self.prefix).filter(|path| !self.others.contains(path)) {
-            // Any other failure: another user's, or gone meanwhile.
-            if take_file(&path) == Err(Errno::NOSPC) {
-                return Err(missing(std::fs::metadata(path).map_or(0, |file| file.len()), free()));
-            }
+/// Takes the room of every shared file that this process writes to, so that it never meets a full file system later.
+pub(crate) fn take(settings: &Settings) -> Result<(), TransportError> {
+    let Ok(maps) = std::fs::read_to_string("/proc/self/maps") else { return Ok(()) };
+    let ours = format!("{SHARED}/{}", settings.prefix);
+    let paths =
+        maps.lines().filter(|line| line.split(' ').nth(1).is_some_and(|rights| rights.starts_with("rw") && rights.ends_with('s')));
+    let mut paths: Vec<&str> = paths.filter_map(|line| line.find(&ours).map(|at| &line[at..])).collect();
+    paths.dedup();
+    for path in paths {
+        // Any other failure: removed meanwhile, or a file system that has nothing to give.
+        if let Err(Errno::NOSPC | Errno::DQUOT | Errno::NOMEM | Errno::INTR) = take_file(path) {
+            return Err(missing(std::fs::metadata(path).map_or(0, |file| file.len()), free()));
         }
-        Ok(())
     }
+    Ok(())
 }
 
-fn files(prefix: &str) -> impl Iterator<Item = PathBuf> {
-    let files = std::fs::read_dir(SHARED).into_iter().flatten().flatten();
-    files.filter(move |file| file.file_name().to_string_lossy().starts_with(prefix)).map(|file| file.path())
-}
-
-fn take_file(path: &Path) -> Result<(), Errno> {
+fn take_file(path: &str) -> Result<(), Errno> {
+    /// Signals that may come meanwhile: each undoes what was taken.
+    const INTERRUPTIONS: usize = 100;
     let file = rustix::fs::open(path, OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW | OFlags::NONBLOCK, Mode::empty())?;
     let stat = rustix::fs::fstat(&file)?;
     let (length, taken) = (stat.st_size.unsigned_abs(), stat.st_blocks.unsigned_abs() * 512);
     if taken >= length {
         return Ok(());
     }
-    rustix::fs::fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length)
+    let take = || rustix::fs::fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length);
+    (0..INTERRUPTIONS).map(|_| take()).find(|done| *done != Err(Errno::INTR)).unwrap_or(Err(Errno::INTR))
 }
 
 fn missing(bytes: u64, free: u64) -> TransportError {
