@@ -135,6 +135,13 @@ impl Robot {
         self.joints.len()
     }
 
+    /// How far a joint can move by its model, rad or m; 0 where that is not said.
+    pub fn range(&self, joint: usize) -> f64 {
+        let limits = self.arm.bodies()[joint].joint.limits;
+        let range = limits.upper - limits.lower;
+        if range.is_finite() { range } else { 0.0 }
+    }
+
     /// Unit of a joint's position.
     pub fn position_unit(&self, joint: usize) -> &'static str {
         if self.prismatic[joint] { "m" } else { "rad" }

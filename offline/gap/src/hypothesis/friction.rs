@@ -104,11 +104,12 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     }));
     let slow = STRIBECK_SPEED.map(|share| share * speed);
     // On bristles too: else plain friction that rounds better would pass for it.
-    let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), positive, by_speed as Turn);
+    let excess = Bound::UpTo(STATIC_EXCESS);
+    let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), by_speed as Turn);
     let starts = product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]);
-    let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, Bound::UpTo(STATIC_EXCESS), by_travel as Turn);
+    let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, by_travel as Turn);
     let least = STRIBECK_LEAST * speed;
-    for (names, starts, excess, sign) in [speeds, bristles] {
+    for (names, starts, sign) in [speeds, bristles] {
         let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
         all.push(
             Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {

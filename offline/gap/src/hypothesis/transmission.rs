@@ -1,7 +1,7 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
 use super::dictionary::{Dictionary, minus, size};
-use super::{Bound, Column, Family, geometric, product};
+use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
 /// Widths of play, shares of a joint's travel.
@@ -30,7 +30,8 @@ pub(crate) const GROUND: &str = "to the ground";
 pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness";
 /// Time constants of creep, s.
 const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
-/// Periods of an eccentric pulley, from and to as shares of the travel, and how many.
+/// Periods of an eccentric pulley, from and to as shares of the travel, and how many. Where the recording shows a small part of what the
+/// joint can do they go on to that: a pulley is as large as the joint needs it.
 const PERIODS: (f64, f64, usize) = (0.03, 2.5, 36);
 
 const TRANSMISSION: Channel = Channel::Transmission;
@@ -387,8 +388,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let travel = dictionary.travel(j);
     // A bend in points that a camera saw is mostly play or the camera.
     let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
-    let (from, to, count) = PERIODS;
-    let periods = geometric(travel * from, travel * to, count);
+    let periods = periods(travel, dictionary.problem.robot.range(j));
     all.push(
         Family::shaped(
             "pulley_eccentricity",
@@ -407,6 +407,14 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         )
         .penalised(2.0 + unlikely),
     );
+}
+
+/// Periods of an eccentric pulley to begin with, of a joint that travels so far of so much that it can.
+fn periods(travel: f64, range: f64) -> Vec<f64> {
+    let (from, to, count) = PERIODS;
+    let ratio = (to / from).powf(1.0 / (count - 1) as f64);
+    let more = (range / (travel * to)).ln().max(0.0) / ratio.ln();
+    (0..count + more.ceil() as usize).map(|k| travel * from * ratio.powi(k as i32)).collect()
 }
 
 fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
