@@ -1,6 +1,6 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
-use super::dictionary::{Dictionary, minus, size};
+use super::dictionary::{Dictionary, minus, size, times};
 use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
@@ -389,24 +389,34 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     // A bend in points that a camera saw is mostly play or the camera.
     let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
     let periods = periods(travel, dictionary.problem.robot.range(j));
-    all.push(
-        Family::shaped(
-            "pulley_eccentricity",
-            &[j],
-            "once per turn",
-            TRANSMISSION,
-            &[free, free],
-            &[("period", true)],
-            product(&[&periods]),
-            move |d, s| {
-                let q = position(d, j);
-                // q_true = q + e sin(...): the deflection is the opposite.
-                let wave = |phase: f64| q.iter().map(|q| -(std::f64::consts::TAU * q / s[0] + phase).sin()).collect();
-                vec![d.deflection_of(j, wave(0.0)), d.deflection_of(j, wave(std::f64::consts::FRAC_PI_2))]
-            },
-        )
-        .penalised(2.0 + unlikely),
-    );
+    for (form, carries) in [("once per turn", false), ("once per turn, torque too", true)] {
+        all.push(
+            Family::shaped(
+                "pulley_eccentricity",
+                &[j],
+                form,
+                TRANSMISSION,
+                &[free, free],
+                &[("period", true)],
+                product(&[&periods]),
+                move |d, s| {
+                    let (q, rate) = (position(d, j), std::f64::consts::TAU / s[0]);
+                    let wave = |phase: f64| {
+                        // q_true = q + e sin(...): the deflection is the opposite.
+                        let mut column = d.deflection_of(j, q.iter().map(|q| -(rate * q + phase).sin()).collect());
+                        if carries {
+                            // The lever turns with the pulley.
+                            let lever: Vec<f64> = q.iter().map(|q| rate * (rate * q + phase).cos()).collect();
+                            column.push(d.problem.cell(Channel::JointTorque, j), &times(&lever, &d.load(j)));
+                        }
+                        column
+                    };
+                    vec![wave(0.0), wave(std::f64::consts::FRAC_PI_2)]
+                },
+            )
+            .penalised(2.0 + unlikely),
+        );
+    }
 }
 
 /// Periods of an eccentric pulley to begin with, of a joint that travels so far of so much that it can.
