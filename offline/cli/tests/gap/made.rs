@@ -3,6 +3,7 @@
 use crate::common::{Case, Folder, done, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
 use gap_report::{Report, Status};
 use generator::order::{Kind, Order, Wanted};
+use generator::trajectory::Excitation;
 use std::path::Path;
 
 #[test]
@@ -62,6 +63,28 @@ fn hysteresis_as_large_as_the_noise_is_told_from_a_zero_that_is_off() {
         let (_, [low, high]) = parameter(first, "g");
         assert!((0.5..=1.0).contains(&low) && low < high && high <= 1.0, "{low} to {high}");
     }
+}
+
+#[test]
+fn a_pulley_out_of_true_is_found_in_a_small_part_of_its_turn() {
+    // The joint moves through less than a third of a turn, where a sine is nearly the straight line of a wrong ratio.
+    let folder = Folder::new("turn");
+    let pulley = [("e_over_r", 0.0043), ("period", 0.63), ("phi", 1.56)];
+    let effects = vec![wanted("pulley_eccentricity", Some(2), &pulley)];
+    let order = Order {
+        seed: 2,
+        label: "e2".to_owned(),
+        effects,
+        excitation: Excitation::Poor,
+        seconds: 12.0,
+        runs: 2,
+        ..Order::default()
+    };
+    let (case, truth) = written(&folder, &order);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "pulley_eccentricity", truth[0].joint_name.as_ref().expect("a joint"));
+    near(first, "e_over_r", 0.0043, 0.5);
+    near(first, "period", 0.63, 0.3);
 }
 
 #[test]
