@@ -125,7 +125,8 @@ impl Watch {
             self.collect(None);
             self.check_link();
             self.write_stats();
-            if self.interval_began.elapsed() >= self.interval_length {
+            // A look comes once a second: the one nearest to the interval's end closes it.
+            if self.interval_began.elapsed() + SECOND / 2 >= self.interval_length {
                 self.write_log();
             }
         }

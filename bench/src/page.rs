@@ -11,18 +11,23 @@ const PAGE: &str = "# Performance
 Written by `make bench`: every table by one run of `ravenpose-bench full --write`, the offline tools by `bench/offline.py`
 just before it, Keras by `bench/keras_predict.py` when its lines say. Such machines are shared and noisy:
 compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `memory`,
-`sleep`, `spin`, `event`, `means`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`.
+`sleep`, `spin`, `event`, `means`) one part of that. Simulator, recordings, vision and gap finder: `make bench-offline`; training:
+[training.md](training.md).
+
+- *asked*: what the project set itself; *met* is 1 or 0, and nothing is left out that this run missed.
 
 - *floor*: reading the same bytes of weights once, with nothing else done.
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
 - *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16, i12 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
+- *kept warm* is how the service runs it: while it waits for a state it reads its weights, here for 0.2 ms before.
+- *everything out of the caches*: 128 MiB of other data are read before each run; of so few runs no thousandth is told.
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
 - *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last three
   rows are processes of their own, one after the other: compare them with one another.
 - *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
-- The cost of a run is bytes over bandwidth: the growth tables give both. As long as the weights fit in the second cache, its bandwidth
-  counts; beyond, the next one's.
+- The cost of a run is bytes over bandwidth: the growth tables give both. Below some 0.1 MB what is done once per layer counts, beyond
+  the third cache the memory's bandwidth.
 ";
 
 /// What other programs printed, if they ran before.
@@ -31,8 +36,8 @@ const PEERS: &str = "build/bench/peers.txt";
 
 /// Writes all of them; the page to `docs/performance.md`.
 pub(crate) fn write(tables: &[Table], machine: &str) -> Result<(), String> {
-    let mut page = format!("{PAGE}\nMachine: {machine}.\n");
-    if let Some(picture) = tables.iter().find(|table| table.heading().contains("tight loop")).map(svg::bars) {
+    let mut page = format!("{PAGE}\nMachine: {machine}; commit {}.\n", commit());
+    if let Some(picture) = tables.iter().find(|table| table.heading().contains("once a millisecond")).map(svg::bars) {
         whole(Path::new("docs/performance.svg"), &picture)?;
         page.push_str("\n![Median time of one run of the network, by engine and format](performance.svg)\n");
     }
@@ -61,6 +66,13 @@ fn whole(path: &Path, text: &str) -> Result<(), String> {
     let beside = path.with_extension("new");
     let done = std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, path));
     done.map_err(|cause| format!("{}: cannot be written: {cause}", path.display()))
+}
+
+/// What was measured, as git names it.
+fn commit() -> String {
+    let said = std::process::Command::new("git").args(["describe", "--always", "--dirty"]).output();
+    let name = said.ok().filter(|said| said.status.success()).map(|said| String::from_utf8_lossy(&said.stdout).trim().to_owned());
+    name.unwrap_or_else(|| "unknown".to_owned())
 }
 
 /// Processor and kernel, as the machine names them.

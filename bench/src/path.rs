@@ -4,6 +4,7 @@
 //! This module contains `unsafe`: a signal to a child process.
 
 use crate::table::{Table, quantiles};
+use ravenpose::realtime;
 use ravenpose::report::Stats;
 use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
@@ -225,6 +226,93 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
     }
     Ok(Some(Measured { whole, handed_over, missed, stats }))
 }
+
+/// Round trips of [`hop`], the first of which do not count.
+const TRIPS: u64 = 20_000;
+const FIRST_TRIPS: u64 = 2_000;
+/// When an answer to a trip is given up.
+const TRIP_MAX_NS: i64 = 100_000_000;
+
+/// Quantiles of a message's way through shared memory and nothing else, µs: half of the time from a state sent here to a pose sent back by a
+/// thread on the service's core that does nothing but that; both poll.
+pub(crate) fn hop(service_core: usize, priority: i32) -> Result<[f64; 4], String> {
+    let dir = std::env::temp_dir().join(format!("ravenpose-hop-{}", std::process::id()));
+    let settings = Settings { prefix: format!("rphop{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
+    let found = trips(&settings, service_core, priority);
+    remove(&dir, &settings.prefix);
+    found.map(|mut halves| quantiles(&mut halves))
+}
+
+fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<i64>, String> {
+    let told = |error: ravenpose_transport::TransportError| error.to_string();
+    let stopped = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| {
+            for missing in [realtime::pin(service_core), realtime::set_fifo(priority)].into_iter().filter_map(Result::err) {
+                println!("note: {missing}");
+            }
+            let reader: Reader<RavenState> = Reader::open(settings, 1).map_err(told)?;
+            let writer: Writer<CorrectedPose> = Writer::open(settings).map_err(told)?;
+            let mut pose = CorrectedPose::new();
+            while !stopped.load(std::sync::atomic::Ordering::Relaxed) {
+                if let Some(state) = reader.latest().map_err(told)? {
+                    pose.source_sequence = state.sequence;
+                    pose.seal(state.sequence);
+                    writer.send(&pose).map_err(told)?;
+                }
+                std::hint::spin_loop();
+            }
+            Ok::<(), String>(())
+        });
+        let here = || -> Result<Vec<i64>, String> {
+            let writer: Writer<RavenState> = Writer::open(settings).map_err(told)?;
+            let reader: Reader<CorrectedPose> = Reader::open(settings, 1).map_err(told)?;
+            while writer.readers() == 0 || reader.publishers() == 0 {
+                if other.is_finished() {
+                    return Err("a hop could not be measured: the other side did not start".to_owned());
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let mut halves = Vec::with_capacity(TRIPS as usize);
+            for sequence in 1..=TRIPS {
+                let state = state(sequence);
+                let sent = now_ns();
+                writer.send(&state).map_err(told)?;
+                let answered =
+                    |reader: &Reader<CorrectedPose>| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence));
+                let answer = reader.wait(sent + TRIP_MAX_NS, 0, answered).map_err(told)?;
+                if answer.is_some() && sequence > FIRST_TRIPS {
+                    halves.push((now_ns() - sent) / 2);
+                }
+            }
+            Ok(halves)
+        };
+        let found = here();
+        stopped.store(true, std::sync::atomic::Ordering::Relaxed);
+        other.join().map_err(|_| "a part of the benchmark failed".to_owned())??;
+        found
+    })
+}
+
+/// What is asked of the whole path, beside what these tables say: of each way of waiting that has its rows.
+pub(crate) fn asked(table: &Table, waits: &[&str]) -> Table {
+    let mut all = Table::new("What is asked of the whole path, and what this run reached, us", &["asked", "reached", "met"]);
+    let met = |asked: f64, reached: f64| [asked, reached, f64::from(u8::from(reached <= asked))];
+    let hop = table.find(HOP).map_or(f64::NAN, |row| row[0]);
+    for wait in waits {
+        let rows = table.rows_after(&format!("{wait}: "));
+        let median = |name: &str| rows.iter().find(|(row, _)| row.trim() == name).and_then(|(_, values)| values.first().copied());
+        let (Some(inference), Some(total), Some(whole)) = (median("inference"), median("total"), median("input_to_output")) else {
+            continue;
+        };
+        all.row(&format!("{wait}: input to output, at most the network's and 3 us and a hop"), &met(inference + 3.0 + hop, whole));
+        all.row(&format!("{wait}: the loop's own cost (total less inference), below"), &met(2.0, total - inference));
+    }
+    all
+}
+
+/// Name of the row of [`hop`].
+pub(crate) const HOP: &str = "one hop through shared memory, half of there and back";
 
 /// Measures one way of waiting for `seconds`; adds its rows to the table.
 pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {

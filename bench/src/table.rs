@@ -29,6 +29,18 @@ impl Table {
         self.rows.iter().find(|(row, _)| row == name).map(|(_, values)| values.as_slice())
     }
 
+    /// The first row whose name starts so.
+    pub(crate) fn find_starting(&self, start: &str) -> Option<&[f64]> {
+        self.rows.iter().find(|(row, _)| row.starts_with(start)).map(|(_, values)| values.as_slice())
+    }
+
+    /// From the row on whose name starts so, up to the next that is not one of its parts (indented further).
+    pub(crate) fn rows_after(&self, start: &str) -> &[(String, Vec<f64>)] {
+        let Some(first) = self.rows.iter().position(|(row, _)| row.starts_with(start)) else { return &[] };
+        let parts = self.rows[first + 1..].iter().take_while(|(row, _)| row.starts_with(' ')).count();
+        &self.rows[first..=first + parts]
+    }
+
     /// The title without its unit.
     pub(crate) fn heading(&self) -> &str {
         self.title.split(", us").next().unwrap_or(&self.title)

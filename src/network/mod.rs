@@ -189,7 +189,7 @@ impl Plan {
     }
 
     /// Evaluates the network. `input` and `output` must have the plan's widths; what is missing reads as zero, what is too much is
-    /// ignored. NaN and infinity propagate; callers check inputs before and outputs after.
+    /// ignored. NaN propagates; infinity gives what float64 does, or NaN. Callers check inputs before and outputs after.
     pub fn run(&mut self, input: &[f32], output: &mut [f32]) {
         let given = input.len().min(self.input_width);
         let (whole, rest) = input[..given].as_chunks::<LANE>();

@@ -17,7 +17,7 @@ use crate::robot::Robot;
 use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::seldom::Seldom;
-use crate::{builtin, closed_loop, corrected, flexible, known, seldom, verdicts};
+use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, known, seldom, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -78,6 +78,15 @@ pub enum AnalysisError {
     NoChannel {
         /// The first run.
         run: String,
+    },
+    /// No channel that all have.
+    #[error(
+        "nothing to compare: {lacks}; give runs that all have the same channel, and a simulation with the recording's, or leave --sim out to \
+         compare with the robot model"
+    )]
+    OneSided {
+        /// Who lacks what.
+        lacks: String,
     },
     /// The library of explanations does not fit.
     #[error(
@@ -199,7 +208,9 @@ pub fn analyse(
         Status::PartlyExplained => 1,
         Status::Unmodelled => 2,
     };
-    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1) && roughly.left < at_its_word.left + ABOUT;
+    // What is explained at its word is not explained better by what leaves more.
+    let about = if unexplained(&at_its_word) > 0 { ABOUT } else { 0.0 };
+    let better = unexplained(&roughly) < unexplained(&at_its_word).max(1) && roughly.left < at_its_word.left + about;
     Ok(if better { roughly } else { at_its_word })
 }
 
@@ -232,6 +243,7 @@ fn analyse_with(
     // Simulations that move otherwise, or at another time, than the recording.
     let mut apart: Vec<Run> = Vec::new();
     let mut from_recording = false;
+    let mut wrong = Vec::new();
     for (k, one) in given.iter().enumerate() {
         let real = Run::new(&one.real, &robot)?;
         let sim = match &one.sim {
@@ -250,6 +262,10 @@ fn analyse_with(
                 let alike = alike(&real, &sim);
                 if recorded || !alike {
                     apart.push(sim.clone());
+                }
+                if !recorded && !alike && one.sim.is_some() {
+                    let named = |run: &Run| Run { id: one.id.clone(), ..run.clone() };
+                    wrong.extend(comparable::elsewhere(&robot, &named(&real), &sim));
                 }
                 // Of another rate: another run of its own, which says what to believe, and no more.
                 if !alike && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
@@ -275,6 +291,19 @@ fn analyse_with(
             run.1 = None;
         }
         apart.clear();
+        wrong.clear();
+    }
+    if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
+        return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
+    }
+    // Units and signs say more than that it moves otherwise; another recording of the robot moves as it likes.
+    if !from_recording {
+        wrong.splice(0..0, comparable::check(&robot, &runs));
+    }
+    if !wrong.is_empty() {
+        let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
+        quality.splice(0..0, wrong);
+        return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     // With torques of their own they say what to believe of the robot, but not sample by sample.
     let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
@@ -284,9 +313,9 @@ fn analyse_with(
             run.1 = None;
         }
     }
-    if runs[0].0.torque.is_none() && runs[0].0.truth.is_none() && runs[0].0.tip.is_none() {
-        return Err(AnalysisError::NoChannel { run: runs[0].0.id.clone() });
-    }
+    let by_lab: Vec<bool> = given.iter().map(|one| one.sim.is_some()).collect();
+    let in_common = channels::in_common(&mut runs, &by_lab);
+    quality.extend(in_common.map_err(|lacks| AnalysisError::OneSided { lacks })?);
     let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0) };
     let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
     let (train, held) = split(runs);

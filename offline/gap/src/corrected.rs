@@ -3,11 +3,12 @@
 use recordings::Recording;
 use simulator::model::{Bound, Connection, Effect, RobotModel};
 use simulator::physics::{
-    Backlash, CableStretch, Channel as DelayChannel, CoulombFriction, JointCoupling, JointOffset, MotorTorqueScale, Parameters,
-    Payload, Physics, Value, ViscousFriction,
+    Backlash, CableStretch, Channel as DelayChannel, CoulombFriction, JointCoupling, JointOffset, LinkGeometry, MotorTorqueScale,
+    Parameters, Payload, Physics, TransmissionRatio, Value, ViscousFriction,
 };
 
 use arm::serial::{LinkInertia, PARAMETERS};
+use nalgebra::Vector3;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
@@ -44,6 +45,7 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
     }
     let mut after = before.clone();
     let mut left_out = Vec::new();
+    let told = |candidate: &Candidate, why: &str| format!("{}: {why}", named(found, candidate));
     for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
         let candidate = &effect.chosen.candidate;
         let put = as_effect(found, candidate, estimate).and_then(|(effect, sign)| {
@@ -54,6 +56,11 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
                 }
                 with.effects_mut().push(effect);
             }
+            if let Some(constant) = constant_of(&before, candidate, estimate)
+                && !merged(&mut with, &constant, 1.0)
+            {
+                with.effects_mut().push(constant);
+            }
             // A file that could not be read again, or a simulation that runs away, would be worse than one without the effect.
             with.plant().map_err(|error| error.to_string())?;
             stays(&with, &runs[0].real)?;
@@ -61,8 +68,16 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
             Ok(with)
         });
         match put {
-            Ok(with) => after = with,
-            Err(why) => left_out.push(format!("{}: {why}", named(found, candidate))),
+            Ok(with) => {
+                after = with;
+                if candidate.family.form == LATE_COUPLING {
+                    left_out.push(told(
+                        candidate,
+                        "the part of it that comes late, by the other joint's play, is not a term of the simulator",
+                    ));
+                }
+            }
+            Err(why) => left_out.push(told(candidate, &why)),
         }
     }
     after.set_name(&format!("{} corrected", given.name()));
@@ -102,6 +117,12 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
         }
         (Physics::JointCoupling(a), Physics::JointCoupling(b)) => Physics::JointCoupling(JointCoupling { c_ij: a.c_ij + b.c_ij }),
         (Physics::JointOffset(a), Physics::JointOffset(b)) => Physics::JointOffset(JointOffset { o: a.o + b.o }),
+        (Physics::TransmissionRatio(a), Physics::TransmissionRatio(b)) => {
+            Physics::TransmissionRatio(TransmissionRatio { e: a.e + b.e })
+        }
+        (Physics::LinkGeometry(a), Physics::LinkGeometry(b)) => {
+            Physics::LinkGeometry(LinkGeometry { d_alpha: a.d_alpha + b.d_alpha, d_length: a.d_length + b.d_length })
+        }
         (Physics::MotorTorqueScale(a), Physics::MotorTorqueScale(b)) if a.d_0 == 0.0 && b.d_0 == 0.0 => {
             Physics::MotorTorqueScale(MotorTorqueScale { kappa: a.kappa * b.kappa, ..a })
         }
@@ -123,6 +144,39 @@ fn named(found: &Found, candidate: &Candidate) -> String {
     let places = crate::verdicts::joints(found.robot, candidate);
     let at = if places.is_empty() { String::new() } else { format!(" of {}", places.join(" and ")) };
     format!("{}{at}", candidate.family.physics.replace('_', " "))
+}
+
+/// Form of a coupling by a cable that has play itself.
+const LATE_COUPLING: &str = "position, with play";
+
+/// The offset of the joint that goes with a ratio or a coupling, which is right elsewhere than where the simulator has it: a ratio where
+/// the joint was homed, a coupling at zero.
+fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate) -> Option<Effect> {
+    let (family, theta) = (&candidate.family, &estimate.coefficients);
+    let constant = match (family.physics, family.form) {
+        ("transmission_ratio", _) => {
+            let home = model.drives().get(*family.joints.first()?)?.home;
+            theta.get(1).copied().unwrap_or(0.0) + theta[0] * home
+        }
+        ("joint_coupling", "position about a place" | LATE_COUPLING) => *theta.last()?,
+        _ => return None,
+    };
+    if constant == 0.0 {
+        return None;
+    }
+    let physics = Physics::JointOffset(JointOffset { o: constant });
+    let mut effect = windowed(Effect::new(physics, Bound::Joint(*family.joints.first()?)), estimate);
+    effect.source = Some(format!("ravenpose gap (constant of {} {})", family.physics, family.form));
+    Some(effect)
+}
+
+/// The effect in the window that was found.
+fn windowed(mut effect: Effect, estimate: &Estimate) -> Effect {
+    if let Some([from, to]) = estimate.window {
+        effect.from_s = from.map_or(f64::NEG_INFINITY, |(t, _)| t);
+        effect.to_s = to.map_or(f64::INFINITY, |(t, _)| t);
+    }
+    effect
 }
 
 /// Links and drives as learnt from the simulator's output.
@@ -175,7 +229,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
     let bound = match (family.physics, family.form) {
         ("payload", _) if candidate.shape_of("link").is_some_and(|link| link as usize + 1 < found.robot.joint_count()) => {
             // A weight on another link than the last one: what it adds to that link.
-            let place = nalgebra::Vector3::from(["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(0.0)));
+            let place = Vector3::from(["c_x", "c_y", "c_z"].map(|name| candidate.shape_of(name).unwrap_or(0.0)));
             let added = LinkInertia::point(estimate.coefficients[0], place).parameters();
             parameters = vector("dpi_B", added.to_vec());
             name = "link_inertia";
@@ -188,6 +242,11 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }
         ("link_geometry", form) => {
             let link = joint.ok_or("it has no link")?;
+            if let Some(axis) = form.strip_prefix("moved along ") {
+                let sign =
+                    along_its_length(found, link, axis).ok_or("a link moved across its length is not a term of the simulator")?;
+                parameters = Parameters::of(&[("d_length", sign * estimate.coefficients[0])]);
+            }
             // The tool comes after the last link.
             Bound::Link(if [TOOL_LENGTH, TOOL_TWIST].contains(&form) { link + 1 } else { link })
         }
@@ -216,6 +275,13 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
                         counts_per_a of the drive"
                 .to_owned());
         }
+        ("thermal_drift", _) if !parameters.0.contains_key("kappa_T") => {
+            return Err(if family.form == "position" {
+                "a position that drifts is not a term of the simulator".to_owned()
+            } else {
+                "the model has no friction there that could fade".to_owned()
+            });
+        }
         ("cable_hysteresis", "play of many widths") => {
             return Err("play of many widths, of a joint without known load, is not a term of the simulator".to_owned());
         }
@@ -227,14 +293,28 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
     }
     let sign = less(name, &mut parameters);
     let physics = Physics::new(name, &parameters).ok_or("the simulator does not know it")?.map_err(|error| error.to_string())?;
-    let mut effect = Effect::new(physics, bound);
-    if let Some([from, to]) = estimate.window {
-        effect.from_s = from.map_or(f64::NEG_INFINITY, |(t, _)| t);
-        effect.to_s = to.map_or(f64::INFINITY, |(t, _)| t);
-    }
+    let mut effect = windowed(Effect::new(physics, bound), estimate);
     let told = if name == family.physics { family.form.to_owned() } else { format!("{} {}", family.physics, family.form) };
     effect.source = Some(format!("ravenpose gap ({told})"));
     Ok((effect, sign))
+}
+
+/// Is an axis of the frame before a link the one along which the simulator makes it longer? 1, or -1 the other way.
+fn along_its_length(found: &Found, link: usize, axis: &str) -> Option<f64> {
+    let axis = match axis {
+        "x" => Vector3::x(),
+        "y" => Vector3::y(),
+        _ => Vector3::z(),
+    };
+    let body = found.robot.arm.bodies().get(link)?;
+    // A RAVEN-II's insertion is longer along x, which no frame before it shows.
+    if found.robot.with_wrist.is_some() && found.robot.prismatic[link] {
+        return None;
+    }
+    let way = body.placement.translation.vector;
+    let along = way.try_normalize(1e-9).unwrap_or_else(|| body.placement.rotation * body.joint.axis.normalize());
+    let share = along.dot(&axis);
+    (share.abs() > 0.99).then(|| share.signum())
 }
 
 /// Sizes that cannot be negative, of what the model may hold too much of.

@@ -66,6 +66,8 @@ pub struct Motion {
     pub drive_acceleration: Vec<Vec<f64>>,
     /// Velocity of the drives, smoothed little: friction turns with it.
     pub quick_velocity: Vec<Vec<f64>>,
+    /// The same of the joints, with which friction behind the cables turns; none where each drive moves its joint alone.
+    quick_joint_velocity: Option<Vec<Vec<f64>>>,
     /// Torque at the joints, smoothed.
     pub torque: Option<Vec<Vec<f64>>>,
     /// `A⁻¹ m - q`, smoothed.
@@ -119,6 +121,7 @@ impl Motion {
             acceleration: smooth(&run.position, 2),
             drive_velocity: smooth(&run.drive, 1),
             drive_acceleration: smooth(&run.drive, 2),
+            quick_joint_velocity: (run.drive != run.position).then(|| run.position.iter().map(|s| quick.apply(s, 1)).collect()),
             sign_speeds: quick_velocity.iter().map(|v| sign_speed(v)).collect(),
             quick_velocity,
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
@@ -149,11 +152,17 @@ impl Motion {
         self.sign_speeds[joint]
     }
 
+    /// Velocity with which a joint's friction turns, smoothed little: that of its drive, or, behind the cable, its own.
+    pub fn quick(&self, joint: usize, at_link: bool) -> &[f64] {
+        let joints = self.quick_joint_velocity.as_ref().filter(|_| at_link);
+        &joints.unwrap_or(&self.quick_velocity)[joint]
+    }
+
     /// Force of bristles that bend over a travel before they slip, of their level: `z + t zd`, where t is the time in which
     /// their vibration settles (LuGre).
-    pub fn bristle(&self, joint: usize, travel: f64, settling_s: f64) -> Vec<f64> {
+    pub fn bristle(&self, joint: usize, at_link: bool, travel: f64, settling_s: f64) -> Vec<f64> {
         let mut state = 0.0;
-        self.quick_velocity[joint]
+        self.quick(joint, at_link)
             .iter()
             .map(|v| {
                 let moved = v * self.run.dt_s / travel;
@@ -168,6 +177,11 @@ impl Motion {
     /// Sign of a drive's velocity at a sample, as steep as its noise allows.
     pub fn sign(&self, joint: usize, i: usize) -> f64 {
         (self.quick_velocity[joint][i] / self.sign_speeds[joint]).tanh()
+    }
+
+    /// The same of the joint's own velocity.
+    pub fn sign_at_link(&self, joint: usize, i: usize) -> f64 {
+        (self.quick(joint, true)[i] / self.sign_speeds[joint]).tanh()
     }
 }
 

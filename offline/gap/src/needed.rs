@@ -13,8 +13,13 @@ pub fn keep_needed(recording: &mut Recording, model: &RobotModel) {
     let recorded = |name: &str| recording.column(name).is_some_and(|values| values.iter().any(|x| x.is_finite()));
     let counts = !(1..=model.joint_count()).all(|joint| recorded(&format!("tau_{joint}_nm")));
     let forces = model.drives().iter().any(|drive| drive.connection == Connection::Force);
+    // What the wrist moves the tip by is taken off it.
+    let wrist = model.as_raven().is_some() && recorded("truth_x_m");
     let needed = |name: &str| {
         let (quantity, joint) = quantity(name);
+        if wrist && joint.is_some_and(|joint| joint > model.joint_count()) {
+            return matches!(quantity, "jpos" | "truth_jpos");
+        }
         let wanted = match quantity {
             "dac" => counts,
             "jvel" => forces,
@@ -71,7 +76,10 @@ mod tests {
             "tau_5_nm",
             "truth_jpos_5_rad",
         ];
-        assert_eq!(kept(&[&read[..], &not[..]].concat()), read);
+        // With a tip the wrist as well, without one not.
+        assert_eq!(kept(&[&read[..], &not[..]].concat()), [&read[..], &["jpos_7_rad", "truth_jpos_5_rad"]].concat());
+        let (read, not) = (&read[..8], [&not[..], &["jpos_4_rad"]].concat());
+        assert_eq!(kept(&[read, &not].concat()), read);
     }
 
     #[test]

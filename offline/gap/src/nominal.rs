@@ -24,7 +24,7 @@ pub struct Nominal {
     pub inertial: Vec<f64>,
     /// Per joint: rotor inertia, viscous, Coulomb, constant, at the joint.
     pub drives: Vec<[f64; DRIVE_COLUMNS]>,
-    /// Per joint: compliance of the transmission (rad per N·m or m per N) and constant deflection.
+    /// Per drive, in units of its joint: compliance of its cable (rad per N·m or m per N), and a constant.
     pub compliance: Vec<[f64; 2]>,
     /// Per joint: friction behind the cable, viscous and dry, which loads the cable beside the link.
     pub link_friction: Vec<[f64; 2]>,
@@ -119,24 +119,28 @@ impl Nominal {
         for run in runs {
             let Some(torque) = &run.torque else { continue };
             let signs: Vec<Vec<f64>> = (0..n).map(|j| sign_series(run, j)).collect();
+            let shares = robot.strain_shares();
             for &i in &run.rows {
                 let state = run.link(i);
                 robot.arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
                 for j in 0..n {
-                    row.fill(0.0);
-                    row[..links].copy_from_slice(&y[j * links..(j + 1) * links]);
                     let compliance = self.compliance[j][0];
                     if let Some(deflection) = &run.deflection
                         && compliance > 0.0
                     {
-                        add(
-                            &mut gram,
-                            &mut right,
-                            &row[..links],
-                            deflection[j][i] / compliance - self.rubbing(run, j, i),
-                            compliance / deflection_scale[j].max(1e-12),
-                        );
+                        // What loads the drive's cable, and how far it gives way.
+                        row.fill(0.0);
+                        let (mut strain, mut rubbing) = (0.0, 0.0);
+                        for k in 0..n {
+                            strain += coupling[(j, k)] * deflection[k][i];
+                            rubbing += shares[(k, j)] * self.rubbing(run, k, i);
+                            row.iter_mut().zip(&y[k * links..(k + 1) * links]).for_each(|(x, y)| *x += shares[(k, j)] * y);
+                        }
+                        let weight = compliance / deflection_scale[j].max(1e-12);
+                        add(&mut gram, &mut right, &row[..links], strain / compliance - rubbing, weight);
                     }
+                    row.fill(0.0);
+                    row[..links].copy_from_slice(&y[j * links..(j + 1) * links]);
                     for d in (0..n).filter(|d| coupling[(*d, j)] != 0.0) {
                         let drive = [run.drive_acceleration[d][i], run.drive_velocity[d][i], signs[d][i], 1.0];
                         let carried = drive.map(|x| coupling[(d, j)] * x);
@@ -214,7 +218,18 @@ impl Nominal {
         if viscous == 0.0 && dry == 0.0 {
             return 0.0;
         }
-        viscous * run.velocity[j][i] + dry * run.sign(j, i)
+        viscous * run.velocity[j][i] + dry * run.sign_at_link(j, i)
+    }
+
+    /// Deflection `A⁻¹ m - q` of a joint under torques of the links: they load the cables, those give way, and other joints are read through
+    /// them. `shares` is [`Robot::strain_shares`].
+    pub fn deflection(&self, shares: &DMatrix<f64>, joint: usize, link: &[f64]) -> f64 {
+        let n = link.len();
+        let strain = |drive: usize| {
+            let load = (0..n).map(|k| shares[(k, drive)] * link[k]).sum::<f64>();
+            self.compliance[drive][0] * load + self.compliance[drive][1]
+        };
+        (0..n).filter(|drive| shares[(joint, *drive)] != 0.0).map(|drive| shares[(joint, drive)] * strain(drive)).sum()
     }
 
     fn learn_deflection(&mut self, robot: &Robot, runs: &[&Motion]) {
@@ -222,6 +237,7 @@ impl Nominal {
         let before = self.clone();
         let mut evaluator = Evaluator::new(robot, &before);
         let n = robot.joint_count();
+        let (coupling, shares) = (robot.coupling(), robot.strain_shares());
         let (mut load, mut seen) = (vec![Vec::new(); n], vec![Vec::new(); n]);
         let mut rubbed = vec![[Vec::new(), Vec::new()]; n];
         for run in runs {
@@ -229,10 +245,11 @@ impl Nominal {
             for &i in &run.rows {
                 let at = evaluator.link(&run.link(i));
                 for j in 0..n {
-                    load[j].push(at[j]);
-                    seen[j].push(deflection[j][i]);
+                    // Of the drive's cable: what loads it, and how far it gives way.
+                    load[j].push((0..n).map(|k| shares[(k, j)] * at[k]).sum::<f64>());
+                    seen[j].push((0..n).map(|k| coupling[(j, k)] * deflection[k][i]).sum::<f64>());
                     rubbed[j][0].push(run.velocity[j][i]);
-                    rubbed[j][1].push(run.sign(j, i));
+                    rubbed[j][1].push(run.sign_at_link(j, i));
                 }
             }
         }

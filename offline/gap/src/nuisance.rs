@@ -176,7 +176,7 @@ const TURNING: [f64; 3] = [0.003, 0.012, 0.05];
 /// Sign of the motion that turns round over a share of the travel, smoothed.
 fn turning(motion: &Motion, j: usize, share: f64) -> Vec<f64> {
     let (low, high) = range(motion.position[j].iter().copied());
-    motion.window.apply(&motion.bristle(j, (share * (high - low)).max(1e-12), 0.0), 0)
+    motion.window.apply(&motion.bristle(j, false, (share * (high - low)).max(1e-12), 0.0), 0)
 }
 
 /// Nuisances of every cell of a model that was learnt from another recording: friction, constants.

@@ -40,11 +40,12 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             }
             all
         }
-        ("thermal_drift", "position") => vec![named("kappa_T", "1", theta[0]), named("T", "s", shaped("T"))],
+        // The vocabulary has a share of the friction only; how far a position drifts stands in the evidence.
+        ("thermal_drift", "position") => vec![named("T", "s", shaped("T"))],
         ("thermal_drift", _) => {
             let friction = nominal.drives[joint][2];
-            let share = if friction > 0.0 { -theta[0] / friction } else { theta[0] };
-            vec![named("kappa_T", "1", share), named("T", "s", shaped("T"))]
+            let share = (friction > 0.0).then(|| named("kappa_T", "1", -theta[0] / friction));
+            share.into_iter().chain([named("T", "s", shaped("T"))]).collect()
         }
         ("payload", "anywhere on the last link") => {
             let mut all = vec![named("m_p", "kg", theta[0])];
@@ -140,5 +141,25 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         // What has no name has no parameters.
         (crate::hypothesis::UNMODELLED, _) => Vec::new(),
         (physics, form) => unreachable!("{physics} ({form}) has no parameters here"),
+    }
+}
+
+/// What the vocabulary has no parameter for: in words, its value, its unit.
+pub(crate) fn beside(
+    robot: &Robot,
+    nominal: &Nominal,
+    candidate: &Candidate,
+    theta: &[f64],
+) -> Option<(&'static str, f64, &'static str)> {
+    let family = &candidate.family;
+    let joint = family.joints.first().copied().unwrap_or(0);
+    let (effort, position) = (robot.effort_unit(joint), robot.position_unit(joint));
+    match (family.physics, family.form) {
+        ("thermal_drift", "position") => Some(("how far the position drifts until warm", theta[0], position)),
+        ("thermal_drift", _) if nominal.drives[joint][2] <= 0.0 => Some(("how much friction changes until warm", theta[0], effort)),
+        ("motor_torque_scale", form) if form != "scale" && robot.drives[joint].torque_per_count == 0.0 => {
+            Some(("constant torque, of an amplifier whose counts are not known", theta[theta.len() - 1], effort))
+        }
+        _ => None,
     }
 }

@@ -247,15 +247,16 @@ impl<'a> Problem<'a> {
     }
 
     fn push_transmission(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
-        let [compliance, constant] = self.nominal.compliance[j];
+        let shares = self.robot.strain_shares();
+        let expected = |load: &Load| self.nominal.deflection(&shares, j, &load.link);
         let mut cell = Cell::new(Channel::Transmission, j);
         for (r, pair) in self.pairs.iter().enumerate() {
             let deflection = &pair.real.deflection.as_ref().expect("checked by the caller")[j];
             let sim = pair.sim.as_ref().and_then(|sim| sim.deflection.as_ref()).zip(sim_loads[r].as_ref());
             for (k, &i) in pair.real.rows.iter().enumerate() {
-                let mut value = deflection[i] - compliance * self.loads[r][k].link[j] - constant;
+                let mut value = deflection[i] - expected(&self.loads[r][k]);
                 if let Some((sim, loads)) = sim {
-                    value -= sim[j][i] - compliance * loads[k].link[j] - constant;
+                    value -= sim[j][i] - expected(&loads[k]);
                 }
                 cell.rows.push((r, i));
                 cell.residual.push(value);

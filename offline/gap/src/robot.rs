@@ -1,5 +1,6 @@
 //! The robot as the engine sees it: a serial arm, its drives and its transmission, nothing about any recording.
 
+use arm::kinematics::Kinematics;
 use arm::serial::SerialArm;
 use nalgebra::DMatrix;
 use simulator::model::{Connection, RobotError, RobotModel};
@@ -71,6 +72,8 @@ pub struct Robot {
     pub payload_sites: Vec<PayloadSite>,
     /// Physics and joints of the effects that its model holds already: of those there may be less, too.
     pub known: Vec<(String, Vec<usize>)>,
+    /// Of a RAVEN-II the kinematics of all seven joints: its tip goes with the wrist, too.
+    pub with_wrist: Option<Kinematics>,
 }
 
 impl Robot {
@@ -115,9 +118,18 @@ impl Robot {
             columns: model.columns.iter().map(|c| (c.name.clone(), c.source.clone(), c.scale)).collect(),
             payload_sites: sites.collect(),
             known: crate::known::effects(model),
+            with_wrist: model.as_raven().map(|robot| robot.raven.arm(model.side()).kinematics.clone()),
             motor_from_joint,
             arm,
         }
+    }
+
+    /// How far the tool's own joints (4 to 7, rad) hold the tip from where it is with all of them at 0, in the base frame, m; joints 1 to 3 in rad
+    /// and m. Nothing of a robot without them.
+    pub fn off_by_wrist(&self, joints: [f64; 3], wrist: [f64; 4]) -> [f64; 3] {
+        let Some(kinematics) = &self.with_wrist else { return [0.0; 3] };
+        let ([a, b, c], [d, e, f, g]) = (joints, wrist);
+        (kinematics.tip_position(&[a, b, c, d, e, f, g]) - kinematics.tip_position(&[a, b, c, 0.0, 0.0, 0.0, 0.0])).into()
     }
 
     /// What each joint adds to the position that a drive sees, in the drive's own joint's units: `A` with ones on its diagonal.
@@ -128,6 +140,12 @@ impl Robot {
             a.ncols(),
             |i, j| if a[(i, i)] == 0.0 { f64::from(u8::from(i == j)) } else { a[(i, j)] / a[(i, i)] },
         )
+    }
+
+    /// Share of a strain of each drive's cable (column) that each joint sees, `C⁻¹`.
+    pub fn strain_shares(&self) -> DMatrix<f64> {
+        let n = self.joint_count();
+        self.coupling().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n))
     }
 
     /// Number of joints.

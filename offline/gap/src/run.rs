@@ -265,10 +265,19 @@ impl Run {
             Some(at_joints(torque.collect()))
         };
         let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
-        let tip = match tip {
+        let mut tip = match tip {
             [Some(x), Some(y), Some(z)] => Some([x, y, z]),
             _ => None,
         };
+        let truth = all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
+            format!("q_act_{}_{}", j + 1, unit(j))
+        }]);
+        // The arm is joints 1 to 3: what the wrist moves the tip by is no difference of them.
+        let wrist = |name: &str| (4..=7).map(|j| series(&format!("{name}_{j}_rad"))).collect::<Option<Vec<_>>>();
+        let with_wrist = robot.with_wrist.is_some() && tip.is_some();
+        if let (Some(tip), Some(wrist)) = (&mut tip, with_wrist.then(|| wrist("truth_jpos").or_else(|| wrist("jpos"))).flatten()) {
+            straighten(robot, tip, truth.as_ref().unwrap_or(&position), &wrist);
+        }
         let mut made = Self {
             id: run,
             start_s: clock.start_s,
@@ -279,9 +288,7 @@ impl Run {
             drive: combine(&robot.coupling(), &position),
             position,
             torque: motor_torque.or_else(joint_torque).or_else(counted),
-            truth: all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
-                format!("q_act_{}_{}", j + 1, unit(j))
-            }]),
+            truth,
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
@@ -529,6 +536,17 @@ pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
     mark(&mut real.mask, &sim.mask);
     sim.mask.clone_from(&real.mask);
     Ok((real, sim))
+}
+
+/// Takes off a tip what the wrist moves it by, wherever there is one.
+fn straighten(robot: &Robot, tip: &mut [Vec<f64>; 3], joints: &[Vec<f64>], wrist: &[Vec<f64>]) {
+    let (Ok(joints), Ok(wrist)) = (<&[Vec<f64>; 3]>::try_from(joints), <&[Vec<f64>; 4]>::try_from(wrist)) else { return };
+    for i in 0..tip[0].len() {
+        if tip[0][i].is_finite() {
+            let off = robot.off_by_wrist(joints.each_ref().map(|s| s[i]), wrist.each_ref().map(|s| s[i]));
+            tip.iter_mut().zip(off).for_each(|(axis, off)| axis[i] -= off);
+        }
+    }
 }
 
 /// Rows of a matrix times a set of series.

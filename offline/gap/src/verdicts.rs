@@ -295,12 +295,15 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let mut evidence =
         Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
     evidence.effect = None;
+    let size = crate::parameters::beside(found.robot, found.nominal, candidate, &estimate.coefficients);
+    let size =
+        size.map(|(name, value, unit)| Evidence::new(name, format!("{value:.3e} {unit}"), (value, unit), TestMethod::HeldOutGain));
     let mut verdict = Verdict::primary(
         number,
         physics.clone(),
         probability,
         location.clone(),
-        (told_parameters(found, candidate, estimate), fit, vec![evidence]),
+        (told_parameters(found, candidate, estimate), fit, std::iter::once(evidence).chain(size).collect()),
         artifact,
     );
     verdict.score = Some(score);

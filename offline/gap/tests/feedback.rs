@@ -102,13 +102,16 @@ fn off(model: &RobotModel, main: &str) -> RobotModel {
 
 /// Finds it, puts it into the model, and finds nothing more on other runs: the model that did it, and those runs.
 fn fed_back(physics: &str, bound: Bound, parameters: &[(&str, f64)]) -> (RobotModel, [Recording; 2]) {
-    let robot = with(physics, bound, parameters);
-    let first = gap(&nominal(), &[recorded(&robot, 1), recorded(&robot, 2)]);
+    fed_back_of(&with(physics, bound, parameters), physics)
+}
+
+fn fed_back_of(robot: &RobotModel, physics: &str) -> (RobotModel, [Recording; 2]) {
+    let first = gap(&nominal(), &[recorded(robot, 1), recorded(robot, 2)]);
     assert_eq!(named(&first.report), [physics], "{}", first.report.summary);
     assert!(first.left_out.is_empty(), "{:?}", first.left_out);
     let corrected = RobotModel::from_toml(first.corrected.as_ref().expect("a model"), None).expect("a robot");
     simulated_again(&first.report);
-    let others = [recorded(&robot, 3), recorded(&robot, 4)];
+    let others = [recorded(robot, 3), recorded(robot, 4)];
     let second = gap(&corrected, &others);
     assert_eq!(second.report.status, Status::NoMismatch, "{}", second.report.summary);
     assert!(second.corrected.is_none());
@@ -169,6 +172,27 @@ fn a_wrong_zero_is_fed_back() {
 #[test]
 fn a_wrong_coupling_is_fed_back() {
     found_out("joint_coupling", "c_ij", &fed_back("joint_coupling", Bound::Pair(1, 0), &[("c_ij", 0.08)]));
+}
+
+#[test]
+fn dry_friction_is_fed_back() {
+    found_out("coulomb_friction", "f_c", &fed_back("coulomb_friction", Bound::Joint(1), &[("f_c", 1.5)]));
+}
+
+#[test]
+fn a_ratio_takes_the_place_along_where_it_is_right() {
+    // Homed in the middle of its travel, 1.5 rad.
+    let mut robot = with("transmission_ratio", Bound::Joint(1), &[("e", 0.01)]);
+    let offset = Physics::new("joint_offset", &Parameters::of(&[("o", -0.015)])).expect("a name").expect("parameters");
+    robot.effects_mut().push(Effect::new(offset, Bound::Joint(1)));
+    let (corrected, _) = fed_back_of(&robot, "transmission_ratio");
+    let names: Vec<&str> = corrected.effects().iter().map(|effect| effect.physics.name()).collect();
+    assert_eq!(names, ["transmission_ratio", "joint_offset"]);
+}
+
+#[test]
+fn a_bent_tool_is_fed_back() {
+    found_out("link_geometry", "d_length", &fed_back("link_geometry", Bound::Link(3), &[("d_length", 0.004)]));
 }
 
 #[test]

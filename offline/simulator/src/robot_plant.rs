@@ -228,9 +228,11 @@ pub(crate) fn true_geometry(robot: &Robot, side: Side) -> Raven2 {
                 Side::Green => &mut plant.kinematics.green,
             };
             rows.alpha_deg[link] += d_alpha.to_degrees();
+            // Longer, whichever way the row counts it.
+            let longer = |length: f64| length + d_length * length.signum();
             match &mut rows.d_m[link] {
-                LengthEntry::Constant(length) if rows.a_m[link] == 0.0 => *length += d_length,
-                _ => rows.a_m[link] += d_length,
+                LengthEntry::Constant(length) if rows.a_m[link] == 0.0 => *length = longer(*length),
+                _ => rows.a_m[link] = longer(rows.a_m[link]),
             }
         }
     }

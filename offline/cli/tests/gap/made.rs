@@ -1,10 +1,10 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
 use crate::common::{Case, Folder, done, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
-use gap_report::{Report, Status};
+use gap_report::{Channel, Report, Status};
 use generator::order::{Kind, Order, Wanted};
 use generator::trajectory::Excitation;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[test]
 fn of_nothing_nothing_is_said() {
@@ -26,6 +26,17 @@ fn is_no_alarm(matrix: &str, seed: u64, id: &str) {
     assert!(truth.is_empty());
     let report = case.judged(&folder.file("out"));
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+}
+
+#[test]
+fn dry_friction_behind_the_elbows_cable_is_no_play() {
+    // It stretches the cable by what play would be, and moves the tip.
+    let folder = Folder::new("elbow");
+    let robot = folder.write("dry.toml", with_effect("physics = \"coulomb_friction\"\njoint = 2\nparameters = { f_c = 0.8 }"));
+    let run = folder.run("0.5", Some(&robot), &[]);
+    let report = Case { robot: PathBuf::from("raven2-nominal"), real: vec![run], sim: Vec::new() }.judged(&folder.file("out"));
+    let first = named(&report, "coulomb_friction", "elbow");
+    near(first, "f_c", 0.8, 0.05);
 }
 
 #[test]
@@ -85,6 +96,23 @@ fn a_pulley_out_of_true_is_found_in_a_small_part_of_its_turn() {
     let first = named(&report, "pulley_eccentricity", truth[0].joint_name.as_ref().expect("a joint"));
     near(first, "e_over_r", 0.0043, 0.5);
     near(first, "period", 0.63, 0.3);
+}
+
+#[test]
+fn a_position_that_drifts_is_no_share_of_friction() {
+    let folder = Folder::new("drift");
+    let (case, truth) = made(&folder, "drift", &[wanted("thermal_drift", Some(1), &[("drift", 0.02), ("T", 10.0)])], 24.0);
+    let out = folder.file("out");
+    let report = case.judged(&out);
+    let first = named(&report, "thermal_drift", truth[0].joint_name.as_ref().expect("a joint"));
+    assert!(first.parameters.iter().all(|parameter| parameter.name == "T"), "{:?}", first.parameters);
+    let drift = first.evidence.iter().find(|evidence| evidence.test.contains("drifts")).expect("how far");
+    assert!(drift.statistic_name == "rad" && (0.005..0.05).contains(&drift.statistic.abs()), "{drift:?}");
+    // The simulator's effect of this name is friction that fades.
+    let corrected = std::fs::read_to_string(out.join("corrected.toml")).unwrap_or_default();
+    assert!(!corrected.contains("physics = \"thermal_drift\""), "{corrected}");
+    let told = |quality: &gap_report::DataQuality| quality.message.contains("a position that drifts is not a term");
+    assert!(report.data_quality.iter().any(told), "{:?}", report.data_quality);
 }
 
 #[test]
@@ -262,11 +290,19 @@ fn timeless(report: &Report) -> serde_json::Value {
 }
 
 #[test]
-fn a_corrected_model_leaves_nothing_to_be_found() {
-    // What was found, put into the model, and the recordings compared with that.
+fn a_robot_agrees_with_its_own_simulation() {
     let folder = Folder::new("again");
     let robot = folder.write("heavy.toml", with_effect("physics = \"payload\"\nparameters = { m_p = 0.2, c_z = -0.45 }"));
     let run = folder.run("0.5", Some(&robot), &[]);
     let report = Case { robot, real: vec![run], sim: Vec::new() }.judged(&folder.file("same"));
-    assert_eq!(report.status, Status::NoMismatch, "a robot agrees with its own simulation");
+    assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+    // The tip goes with a wrist that moves through tens of degrees, too: by millimetres.
+    let tip: Vec<f64> = report
+        .mismatch
+        .excess_rms
+        .iter()
+        .filter(|excess| excess.channel == Channel::EndEffector)
+        .map(|excess| excess.value)
+        .collect();
+    assert!(tip.len() == 3 && tip.iter().all(|metres| *metres < 5e-5), "{tip:?}");
 }

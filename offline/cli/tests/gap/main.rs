@@ -10,4 +10,5 @@ mod made;
 #[path = "../common/mod.rs"]
 mod program;
 mod refused;
+mod sides;
 mod watch;

@@ -52,9 +52,11 @@ pub fn quality_headline(check: &DataQuality) -> String {
 }
 
 /// Names of checks and what their failure means.
-const LEADS: [(&str, &str); 15] = [
+const LEADS: [(&str, &str); 17] = [
     ("input_sign", "The recorded torque has the wrong sign"),
     ("torque sign convention", "The recorded torque has the wrong sign"),
+    ("sign_convention", "Recording and simulation have opposite signs"),
+    ("same_motion", "The simulation is not of this recording"),
     ("input_scale", "A recorded quantity has the wrong unit or scale"),
     ("command_replay", "The logged motor commands are not what the controller would give"),
     ("time_order", "The recorded times are out of order"),

@@ -154,6 +154,10 @@ impl Facts<'_> {
     fn motor(&self, at: &str) -> String {
         match self.parameter("kappa") {
             Some(kappa) if kappa.value < 0.0 => format!("the recorded motor torque of {at} has the opposite sign"),
+            Some(kappa) if kappa.value == 1.0 => {
+                let by = self.parameter("d_0").map_or_else(String::new, |by| format!(" {}", amount(by)));
+                format!("the motor of {at} gives a constant torque{by} that the simulation lacks")
+            }
             Some(kappa) => format!("the motor of {at} gives {} times the torque that the simulation assumes", amount(kappa)),
             None => format!("the motor of {at} gives another torque than the simulation assumes"),
         }
@@ -202,10 +206,21 @@ impl Facts<'_> {
             Subsystem::Camera => "camera positions",
             Subsystem::Motor | Subsystem::Amplifier | Subsystem::Controller => "motor torques",
             Subsystem::Sensor => "sensor readings",
-            _ => "measurements",
+            _ => match location.channel {
+                Channel::EndEffector => "positions of the tip",
+                Channel::JointTorque => "motor torques",
+                _ => "measurements",
+            },
         };
         let of = if location.joint.is_empty() { String::new() } else { format!(" of {}", joints(&location.joint)) };
         match (self.parameter("d"), self.parameter("clock_drift")) {
+            // Which of the two is late is not to be seen.
+            (Some(d), _) if location.channel == Channel::Transmission => {
+                format!(
+                    "joint encoders and motor positions are {} further apart in time than the simulation assumes",
+                    amount(&size(d))
+                )
+            }
             (Some(d), _) => {
                 let way = if d.value < 0.0 { "earlier" } else { "later" };
                 format!("{what}{of} arrive {} {way} than the simulation assumes", amount(&size(d)))

@@ -93,7 +93,7 @@ impl<'a> Dictionary<'a> {
                 jacobian[..3 * n].to_vec()
             })
             .collect();
-        let strain_shares = problem.robot.coupling().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+        let strain_shares = problem.robot.strain_shares();
         Self { problem, grid, tip_jacobian, tip_rows, strain_shares, regressor: OnceLock::new() }
     }
 
@@ -165,17 +165,28 @@ impl<'a> Dictionary<'a> {
             column.push(self.problem.cell(Channel::JointTorque, j), torque);
         }
         if at_link {
-            let stretched: Vec<Option<Vec<f64>>> = torques
-                .iter()
-                .enumerate()
-                .map(|(j, torque)| {
-                    let compliance = self.problem.nominal.compliance[j][0];
-                    torque.as_ref().filter(|_| compliance > 0.0).map(|t| t.iter().map(|x| x * compliance).collect())
-                })
-                .collect();
+            let stretched = self.stretched_by(torques);
             self.stretch(&mut column, &stretched);
         }
         column
+    }
+
+    /// Deflections of the joints by torques at them: each loads the cables that hold it, `f = C⁻ᵀ τ`, those give way by their compliance, and
+    /// `A⁻¹ m` takes that for motion of every joint that is read through them, `C⁻¹`.
+    fn stretched_by(&self, torques: &[Option<Vec<f64>>]) -> Vec<Option<Vec<f64>>> {
+        let (n, shares) = (self.joints(), &self.strain_shares);
+        let sum = |weight: &dyn Fn(usize) -> f64, series: &[Option<Vec<f64>>]| {
+            let mut out: Option<Vec<f64>> = None;
+            for (k, series) in series.iter().enumerate().filter(|(k, _)| weight(*k) != 0.0) {
+                let Some(series) = series else { continue };
+                let out = out.get_or_insert_with(|| vec![0.0; series.len()]);
+                out.iter_mut().zip(series).for_each(|(out, x)| *out += weight(k) * x);
+            }
+            out
+        };
+        let compliance = |drive: usize| self.problem.nominal.compliance[drive][0];
+        let strains: Vec<_> = (0..n).map(|drive| sum(&|joint| compliance(drive) * shares[(joint, drive)], torques)).collect();
+        (0..n).map(|joint| sum(&|drive| shares[(joint, drive)], &strains)).collect()
     }
 
     /// Deflections `A⁻¹ m - q` of the joints in addition.

@@ -7,8 +7,8 @@ use crate::problem::Channel;
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
-/// A sign of the motion in one run with the numbers that round it, at every row.
-type Turn = fn(&Dictionary, usize, usize, &[f64]) -> Vec<f64>;
+/// A sign of the motion of a joint, before or behind its cable, in one run with the numbers that round it, at every row.
+type Turn = fn(&Dictionary, usize, (usize, bool), &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
@@ -47,7 +47,14 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: bool, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
     let travels = presliding(dictionary, j);
-    let velocity = move |d: &Dictionary| d.at_grid(|r, i, _| d.problem.pairs[r].real.drive_velocity[j][i]);
+    // Before the cable it turns with the drive, which other joints' cables may move too, behind it with the joint.
+    let velocity = move |d: &Dictionary| {
+        d.at_grid(|r, i, _| {
+            let motion = &d.problem.pairs[r].real;
+            if at_link { motion.velocity[j][i] } else { motion.drive_velocity[j][i] }
+        })
+    };
+    let place = (j, at_link);
     let speed = size(&velocity(dictionary)).max(1e-9);
     let by_load = move |d: &Dictionary, sign: &[f64]| {
         let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
@@ -59,11 +66,11 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), by_travel as Turn);
     for (names, starts, sign) in [speeds, bristles] {
         all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
-            vec![d.effort_of(j, smooth(d, j, s, sign), at_link)]
+            vec![d.effort_of(j, smooth(d, place, s, sign), at_link)]
         }));
         all.push(
             Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
-                vec![by_load(d, &smooth(d, j, s, sign))]
+                vec![by_load(d, &smooth(d, place, s, sign))]
             })
             .penalised(1.0),
         );
@@ -77,7 +84,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                 names,
                 starts.clone(),
                 move |d, s| {
-                    let sign = smooth(d, j, s, sign);
+                    let sign = smooth(d, place, s, sign);
                     vec![by_load(d, &sign), d.effort_of(j, sign, at_link)]
                 },
             )
@@ -93,7 +100,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     &[Bound::Free],
                     &[&[("T", true)], names].concat(),
                     HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t], &s[..]].concat())).collect(),
-                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &smooth(d, j, &s[1..], sign)), false)],
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &smooth(d, place, &s[1..], sign)), false)],
                 )
                 .penalised(2.0),
             );
@@ -115,8 +122,8 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
             Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {
                 let mut shape = s.to_vec();
                 shape[0] = shape[0].max(least);
-                let extra = d.smoothed(|r| stribeck(d, r, j, &shape, sign));
-                vec![d.effort_of(j, smooth(d, j, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
+                let extra = d.smoothed(|r| stribeck(d, r, place, &shape, sign));
+                vec![d.effort_of(j, smooth(d, place, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
             })
             .penalised(3.0),
         );
@@ -129,31 +136,31 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
-fn smooth(dictionary: &Dictionary, j: usize, shape: &[f64], sign: Turn) -> Vec<f64> {
-    dictionary.smoothed(|r| sign(dictionary, r, j, shape))
+fn smooth(dictionary: &Dictionary, place: (usize, bool), shape: &[f64], sign: Turn) -> Vec<f64> {
+    dictionary.smoothed(|r| sign(dictionary, r, place, shape))
 }
 
 /// Turning round over a presliding travel; shape: that travel, and the time in which the vibration of such bristles settles
 /// (LuGre: `z + t zd`).
-fn by_travel(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64]) -> Vec<f64> {
-    dictionary.problem.pairs[run].real.bristle(j, shape[0].max(1e-12), shape[1])
+fn by_travel(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64]) -> Vec<f64> {
+    dictionary.problem.pairs[run].real.bristle(j, at_link, shape[0].max(1e-12), shape[1])
 }
 
 /// Turning over a speed, the shape.
-fn by_speed(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64]) -> Vec<f64> {
-    dictionary.problem.pairs[run].real.quick_velocity[j].iter().map(|v| (v / shape[0]).tanh()).collect()
+fn by_speed(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64]) -> Vec<f64> {
+    dictionary.problem.pairs[run].real.quick(j, at_link).iter().map(|v| (v / shape[0]).tanh()).collect()
 }
 
 /// Sign of the velocity as steep as its noise allows, smoothed.
 pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     let speed = dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max);
-    smooth(dictionary, j, &[speed], by_speed)
+    smooth(dictionary, (j, false), &[speed], by_speed)
 }
 
 /// What the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, and that of the sign.
-fn stribeck(dictionary: &Dictionary, run: usize, j: usize, shape: &[f64], sign: Turn) -> Vec<f64> {
-    let speeds = &dictionary.problem.pairs[run].real.quick_velocity[j];
-    let signs = sign(dictionary, run, j, &shape[2..]);
+fn stribeck(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64], sign: Turn) -> Vec<f64> {
+    let speeds = dictionary.problem.pairs[run].real.quick(j, at_link);
+    let signs = sign(dictionary, run, (j, at_link), &shape[2..]);
     signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 

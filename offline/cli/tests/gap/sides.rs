@@ -1,0 +1,153 @@
+//! What is not the same on both sides: columns, units, signs, the robot.
+
+use crate::common::{Case, Folder, lines, made, near, primary, refused, report, wanted};
+use gap_report::{Channel, Level, Report, Status};
+use std::path::{Path, PathBuf};
+
+const FRICTION: f64 = 2.0;
+
+/// Dry friction of the second joint, in two runs.
+fn friction(folder: &Folder) -> Case {
+    made(folder, "sides", &[wanted("coulomb_friction", Some(2), &[("f_c", FRICTION)])], 12.0).0
+}
+
+/// A table with one column after the other changed, or left out where nothing comes back.
+fn with_columns(folder: &Folder, name: &str, path: &Path, change: impl Fn(&str, f64) -> Option<f64>) -> PathBuf {
+    let all = lines(path);
+    let header: Vec<&str> = all[0].split(',').collect();
+    let kept: Vec<usize> = (0..header.len()).filter(|k| change(header[*k], 1.0).is_some()).collect();
+    let row = |line: &String| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let cell = |k: &usize| {
+            // The tip is not in every row.
+            cells[*k].parse().map_or_else(|_| cells[*k].to_owned(), |value| change(header[*k], value).expect("kept").to_string())
+        };
+        kept.iter().map(cell).collect::<Vec<_>>().join(",")
+    };
+    let head = kept.iter().map(|k| header[*k]).collect::<Vec<_>>().join(",");
+    let rows: Vec<String> = std::iter::once(head).chain(all[1..].iter().map(row)).collect();
+    folder.write(name, rows.join("\n") + "\n")
+}
+
+fn without<'n>(start: &'n str) -> impl Fn(&str, f64) -> Option<f64> + 'n {
+    move |column, value| (!column.starts_with(start)).then_some(value)
+}
+
+fn told<'r>(report: &'r Report, check: &str) -> &'r str {
+    let quality = report.data_quality.iter().find(|quality| quality.check == check);
+    &quality.unwrap_or_else(|| panic!("{check} is not told: {:?}", report.data_quality)).message
+}
+
+#[test]
+fn a_channel_that_the_simulation_lacks_is_not_compared_and_the_report_says_so() {
+    let folder = Folder::new("sides-one-side");
+    let case = friction(&folder);
+    let bare = |what: &str| -> Vec<PathBuf> {
+        let bare = |(k, path): (usize, &PathBuf)| with_columns(&folder, &format!("bare-{what}-{k}.csv"), path, without(what));
+        case.sim.iter().enumerate().map(bare).collect()
+    };
+    let case_with = |sim: Vec<PathBuf>| Case { sim, real: case.real.clone(), robot: case.robot.clone() };
+    // Without the simulation's torque the numbers of the URDF, a tenth off, must not pass for the robot's.
+    let silent = case_with(bare("tau_")).judged(&folder.file("torque"));
+    assert!(!silent.inputs.channels.contains(&Channel::JointTorque), "{:?}", silent.inputs.channels);
+    assert!(told(&silent, "channel").contains("tau_J") && told(&silent, "channel").contains("friction"));
+    assert!(primary(&silent).iter().all(|verdict| verdict.location.channel != Channel::JointTorque), "{}", silent.summary);
+    // The others go on as before.
+    let still = case_with(bare("truth_jpos")).judged(&folder.file("truth"));
+    assert!(!still.inputs.channels.contains(&Channel::Transmission));
+    let first = primary(&still)[0];
+    assert_eq!(first.physics.to_string(), "coulomb_friction", "{}", still.summary);
+    near(first, "f_c", FRICTION, 0.15);
+}
+
+#[test]
+fn a_channel_that_one_run_lacks_is_left_out_of_all() {
+    let folder = Folder::new("sides-one-run");
+    let case = friction(&folder);
+    // The last run is the one that is held out.
+    for (k, name) in ["first", "last"].into_iter().enumerate() {
+        let mut real = case.real.clone();
+        real[k] = with_columns(&folder, &format!("{name}.csv"), &real[k], without("tau_"));
+        let report = Case { real, sim: case.sim.clone(), robot: case.robot.clone() }.judged(&folder.file(name));
+        assert!(!report.inputs.channels.contains(&Channel::JointTorque), "{name}: {:?}", report.inputs.channels);
+        assert!(told(&report, "channel").contains("tau_J"));
+    }
+}
+
+#[test]
+fn without_a_common_channel_there_is_one_line() {
+    let folder = Folder::new("sides-none");
+    let case = friction(&folder);
+    let only = |folder: &Folder, name: &str, path: &Path, quantity: &'static str| {
+        with_columns(folder, name, path, move |column, value| {
+            let kept = ["t_s", "mpos_", quantity].iter().any(|start| column.starts_with(start));
+            kept.then_some(value)
+        })
+    };
+    let real = vec![only(&folder, "real.csv", &case.real[0], "tau_")];
+    let sim = vec![only(&folder, "sim.csv", &case.sim[0], "truth_jpos")];
+    let out = folder.file("out");
+    let output = Case { real, sim, robot: case.robot.clone() }.gap(&out);
+    refused(&output, &out, &["nothing to compare", "sim", "lacks tau_J", "leave --sim out"]);
+}
+
+/// Recordings in which numbers of the columns that begin so are so many times what they were.
+fn scaled(folder: &Folder, case: &Case, name: &str, start: &'static str, times: f64) -> Case {
+    let other = |(k, path): (usize, &PathBuf)| {
+        with_columns(folder, &format!("{name}-{k}.csv"), path, move |column, value| {
+            Some(if column.starts_with(start) { times * value } else { value })
+        })
+    };
+    Case { real: case.real.iter().enumerate().map(other).collect(), sim: case.sim.clone(), robot: case.robot.clone() }
+}
+
+#[test]
+fn other_units_and_signs_are_no_physics() {
+    let folder = Folder::new("sides-units");
+    let case = friction(&folder);
+    let refuses = |name: &str, start: &'static str, times: f64, check: &str, words: &[&str]| {
+        let out = folder.file(name);
+        let report = report(&out, &scaled(&folder, &case, name, start, times).gap(&out));
+        assert_eq!(report.status, Status::InsufficientData, "{name}: {}", report.summary);
+        let first = &report.data_quality[0];
+        assert_eq!((first.check.as_str(), first.level), (check, Level::Fail), "{name}: {}", first.message);
+        assert!(words.iter().all(|word| first.message.contains(word)), "{name}: {}", first.message);
+        assert!(report.summary.contains("do not allow a verdict"), "{name}: {}", report.summary);
+    };
+    refuses("degrees", "mpos_1", 57.295_779_5, "input_scale", &["convert"]);
+    refuses("millinewtons", "tau_2", 1000.0, "input_scale", &["torque of elbow", "times that of the simulation", "convert"]);
+    refuses("turned", "tau_2", -1.0, "sign_convention", &["torque of elbow", "other sign"]);
+}
+
+#[test]
+fn a_simulation_of_another_robot_or_of_other_commands_gives_no_verdict() {
+    let folder = Folder::new("sides-another");
+    let case = friction(&folder);
+    let elsewhere = Folder::new("sides-elsewhere");
+    // Drives, links and commands of every label are its own.
+    let other = made(&elsewhere, "another", &[], 12.0).0;
+    let refuses = |name: &str, sim: Vec<PathBuf>| {
+        let out = folder.file(name);
+        let report = report(&out, &Case { sim, real: case.real.clone(), robot: case.robot.clone() }.gap(&out));
+        assert_eq!(report.status, Status::InsufficientData, "{name}: {}", report.summary);
+        let first = &report.data_quality[0];
+        assert_eq!((first.check.as_str(), first.level), ("same_motion", Level::Fail), "{name}: {}", first.message);
+        assert!(first.message.contains("simulate the commands of this recording"), "{name}: {}", first.message);
+    };
+    refuses("another", other.sim.clone());
+    refuses("order", case.sim.iter().rev().cloned().collect());
+}
+
+#[test]
+fn what_is_the_same_on_both_sides_is_not_complained_about() {
+    let folder = Folder::new("sides-same");
+    let case = friction(&folder);
+    let report = case.judged(&folder.file("out"));
+    let complaints: Vec<&str> = report
+        .data_quality
+        .iter()
+        .filter(|quality| ["channel", "input_scale", "sign_convention", "same_motion"].contains(&quality.check.as_str()))
+        .map(|quality| quality.message.as_str())
+        .collect();
+    assert_eq!(complaints, Vec::<&str>::new());
+}
