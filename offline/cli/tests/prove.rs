@@ -3,7 +3,6 @@
 #![allow(missing_docs)]
 
 #[path = "common/mod.rs"]
-#[allow(dead_code, reason = "each test program uses its part")]
 mod program;
 
 use program::{Folder, errors, text};

@@ -29,7 +29,7 @@ fn with_columns(folder: &Folder, name: &str, path: &Path, change: impl Fn(&str, 
     folder.write(name, rows.join("\n") + "\n")
 }
 
-fn without<'n>(start: &'n str) -> impl Fn(&str, f64) -> Option<f64> + 'n {
+fn without(start: &str) -> impl Fn(&str, f64) -> Option<f64> + '_ {
     move |column, value| (!column.starts_with(start)).then_some(value)
 }
 
