@@ -41,7 +41,7 @@ fn dry_friction_behind_the_elbows_cable_is_no_play() {
 
 #[test]
 fn what_barely_gains_and_makes_the_held_out_run_worse_is_not_said() {
-    // The one null of a sealed matrix that was an alarm: a weight of 15.7 nats.
+    // The one null of a sealed matrix that was an alarm: a weight, by a later tool a pulley, of 15.7 nats.
     is_no_alarm("full", 1_767_532_870, "d51a126e277d");
 }
 

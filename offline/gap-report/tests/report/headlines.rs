@@ -143,13 +143,13 @@ fn each_physics_says_what_the_robot_has() {
             P::MeasurementDelay,
             &[],
             &[("d", 0.0231)],
-            "Measurements arrive 23.1 ms (20.8 to 25.4) later than the simulation assumes.",
+            "Motor torques arrive 23.1 ms (20.8 to 25.4) later than the simulation assumes.",
         ),
         (
             P::MeasurementDelay,
             elbow,
             &[("d", -0.004)],
-            "Measurements of the elbow joint arrive 4.00 ms (3.60 to 4.40) earlier than the simulation assumes.",
+            "Motor torques of the elbow joint arrive 4.00 ms (3.60 to 4.40) earlier than the simulation assumes.",
         ),
         (
             P::MeasurementDelay,
@@ -190,6 +190,26 @@ fn each_physics_says_what_the_robot_has() {
     for physics in Physics::ALL {
         assert!(cases.iter().any(|case| case.0 == *physics), "{physics}");
     }
+}
+
+#[test]
+fn a_delay_names_what_comes_late_by_its_channel() {
+    let told = |channel: Channel, value: f64| {
+        let mut verdict = verdict(&Physics::MeasurementDelay, &[], Motion::Revolute, &[("d", value)]);
+        verdict.location.channel = channel;
+        headline(&verdict)
+    };
+    let tip = told(Channel::EndEffector, 0.02);
+    assert_eq!(tip, "Positions of the tip arrive 20.0 ms (18.0 to 22.0) later than the simulation assumes.");
+    // Which of the two is late is not to be seen.
+    let encoders = told(Channel::Transmission, 0.001);
+    assert!(encoders.starts_with("Joint encoders and motor positions are 1.00 ms"), "{encoders}");
+}
+
+#[test]
+fn an_amplifiers_offset_is_no_scale_of_one() {
+    let verdict = verdict(&Physics::MotorTorqueScale, &["elbow"], Motion::Revolute, &[("kappa", 1.0)]);
+    assert_eq!(headline(&verdict), "The motor of the elbow joint gives a constant torque that the simulation lacks.");
 }
 
 /// With all parameters, with none, at no joint, at three, linear or turning: a sentence that stands.
