@@ -1,33 +1,63 @@
-//! Fits friction, rotor inertia and amplifier offsets of motors 1 to 3 to a recording of amplifier commands, and prints the
+//! Fits friction, rotor inertia, amplifiers and links of joints 1 to 3 to a recording of amplifier commands, and prints the
 //! robot file: `cargo run --release -p ravenpose-simulator --example fit_recording -- RECORDING.csv > robot.toml`.
-//! Fitted on the first two thirds of its windows of one second; what it prints to standard error is on all and on the rest.
+//! Fitted on the first two thirds, in windows of one second that overlap by half; what it prints to standard error is on all and on the
+//! rest. A random search of one mean and one size of step, from a seed: some four minutes.
 #![allow(missing_docs)]
 
 use arm::Side;
 use recordings::csv;
-use simulator::Robot;
 use simulator::replay::{MotorRecord, Replay, standing_still_rms};
+use simulator::{Random, Robot};
 use std::fmt::Write as _;
 
 const WINDOW: usize = 1000;
-/// Motor Coulomb (3), motor viscous (3), motor inertia (3), joint Coulomb (3), amplifier offsets in counts (3).
-const COUNT: usize = 15;
+const TRIES: usize = 2200;
+const SEED: u64 = 2;
+/// Links: mass (1), shift of the centre (3).
+const LINKS: usize = 24;
+const COUNT: usize = LINKS + 12;
+/// Masses, kg, and centres, m, of the nominal links.
+const MASS: [f64; 3] = [0.503, 0.753, 0.407];
+const CENTRE: [[f64; 3]; 3] = [
+    [0.007_176_359_998_59, 0.163_997_581_375, -0.071_816_874_933_1],
+    [-0.004_103_329_998_7, -0.172_010_044_873, -0.179_319_187_24],
+    [-0.018_705_121_263_6, -0.000_150_526_999_862, -0.000_515_072_604_716],
+];
+/// Three numbers each, one per joint: name, where they begin, how far they may be thought to be off. Friction and inertia from
+/// raven2-plant.toml, `[alternatives.motor_fit_2015]`.
+const BEGIN: [(&str, [f64; 3], [f64; 3]); 8] = [
+    ("motor_coulomb_nm", [0.0516, 0.0887, 0.1], [0.01, 0.01, 0.02]),
+    ("motor_viscous_nm_s", [6.7e-4, 1.85e-3, 1.0e-3], [3e-4, 8e-4, 3e-4]),
+    ("joint_coulomb", [0.05, 0.05, 0.5], [0.1, 0.1, 0.5]),
+    ("joint_viscous", [0.005, 0.0025, 0.0053], [0.05, 0.05, 1.0]),
+    ("motor_v_s_rad_s", [1.0, 1.0, 1.0], [0.5, 0.5, 0.5]),
+    ("inertia_capstan", [4e-4, 1.2e-4, 1.0e-4], [1e-4, 5e-5, 5e-5]),
+    ("kappa", [1.0, 1.0, 1.0], [0.1, 0.1, 0.1]),
+    ("d_0", [8.0, 60.0, 0.0], [20.0, 20.0, 20.0]),
+];
+/// Least of what is divided by.
+const LEAST: [(&str, f64); 3] = [("motor_v_s_rad_s", 0.05), ("inertia_capstan", 1e-5), ("kappa", 0.3)];
 
 fn text(p: &[f64; COUNT]) -> String {
-    let three = |at: usize| format!("[{:.5e}, {:.5e}, {:.5e}]", p[at], p[at + 1], p[at + 2]);
+    let of = |name: &str| BEGIN.iter().position(|(own, ..)| *own == name).map_or(0, |k| 3 * k);
+    let three = |name: &str| format!("{name} = [{:.5e}, {:.5e}, {:.5e}]\n", p[of(name)], p[of(name) + 1], p[of(name) + 2]);
+    let friction: String = BEGIN[..5].iter().map(|(name, ..)| three(name)).collect();
     let mut text = format!(
-        "schema = \"ravenpose-robot/1\"\nname = \"raven2-uiuc-fit\"\nbase = \"raven2-nominal\"\n\n[plant.motor]\ninertia_capstan = {}\n\n[plant.friction]\nmotor_coulomb_nm = {}\nmotor_viscous_nm_s = {}\njoint_coulomb = {}\n",
-        three(6),
-        three(0),
-        three(3),
-        three(9)
+        "schema = \"ravenpose-robot/1\"\nname = \"raven2-uiuc-fit\"\nbase = \"raven2-nominal\"\n\n[plant.motor]\n{}\n[plant.friction]\n{friction}",
+        three("inertia_capstan")
     );
+    for link in 0..3 {
+        let at = LINKS + 4 * link;
+        let centre: Vec<String> = (0..3).map(|k| format!("{:.5e}", CENTRE[link][k] + p[at + 1 + k])).collect();
+        let (number, mass) = (link + 1, MASS[link] * p[at]);
+        let _ = write!(text, "\n[plant.dynamics.gold.link{number}]\nmass_kg = {mass:.5e}\ncom_m = [{}]\n", centre.join(", "));
+    }
     for joint in 0..3 {
+        let (kappa, d_0) = (p[of("kappa") + joint], p[of("d_0") + joint]);
         let _ = write!(
             text,
-            "\n[[effect]]\nphysics = \"motor_torque_scale\"\njoint = {}\nparameters = {{ d_0 = {:.2} }}\n",
-            joint + 1,
-            p[12 + joint]
+            "\n[[effect]]\nphysics = \"motor_torque_scale\"\njoint = {}\nparameters = {{ kappa = {kappa:.5}, d_0 = {d_0:.2} }}\n",
+            joint + 1
         );
     }
     text
@@ -38,40 +68,60 @@ fn main() {
     let record = MotorRecord::from_recording(&csv::read(path.as_ref()).expect("recording")).expect("motors");
     let split = record.len() * 2 / 3 / WINDOW * WINDOW;
     let (train, rest) = (record.part(0..split), record.part(split..record.len()));
-    let still = standing_still_rms(&train, WINDOW);
-    let cost = |p: &[f64; COUNT]| -> f64 {
-        let robot = Robot::from_toml(&text(p)).expect("robot");
-        let rms = Replay::new(&robot, Side::Gold).expect("plant").rms(&train, WINDOW);
-        (0..3).map(|i| (rms[i] / still[i]).powi(2)).sum::<f64>()
-    };
-    // From the least-squares figures of raven2-plant.toml, [alternatives.motor_fit_2015].
-    let mut p = [0.0516, 0.0887, 0.06, 6.7e-4, 1.85e-3, 1.0e-3, 1.79e-4, 1.57e-4, 1.8e-4, 0.05, 0.05, 0.3, 0.0, 0.0, 0.0];
-    let mut best = cost(&p);
-    let mut steps = [1.3_f64; COUNT];
-    let mut offsets = 30.0;
-    for sweep in 0..14 {
-        for i in 0..COUNT {
-            for up in [true, false] {
-                let mut tried = p;
-                if i < 12 {
-                    tried[i] *= if up { steps[i] } else { 1.0 / steps[i] };
-                } else {
-                    tried[i] += if up { offsets } else { -offsets };
-                }
-                let found = cost(&tried);
-                if found < best {
-                    (best, p) = (found, tried);
-                    break;
-                }
-                if !up && i < 12 {
-                    steps[i] = 1.0 + (steps[i] - 1.0) * 0.7;
-                }
-            }
-        }
-        offsets *= 0.85;
-        eprintln!("sweep {sweep}: {best:.4}");
+    let between = record.part(WINDOW / 2..split - WINDOW / 2);
+    let still = [standing_still_rms(&train, WINDOW), standing_still_rms(&between, WINDOW)];
+    let mut begin = [0.0; COUNT];
+    let mut size = [0.01; COUNT];
+    let mut least = [f64::NEG_INFINITY; COUNT];
+    for (k, (name, from, sizes)) in BEGIN.iter().enumerate() {
+        begin[3 * k..3 * k + 3].copy_from_slice(from);
+        size[3 * k..3 * k + 3].copy_from_slice(sizes);
+        let floor = LEAST.iter().find(|(own, _)| own == name).map_or(0.0, |(_, floor)| *floor);
+        least[3 * k..3 * k + 3].fill(if *name == "d_0" { f64::NEG_INFINITY } else { floor });
     }
-    let robot = Robot::from_toml(&text(&p)).expect("robot");
+    for link in 0..3 {
+        (begin[LINKS + 4 * link], size[LINKS + 4 * link], least[LINKS + 4 * link]) = (1.0, 0.1, 0.1);
+    }
+    // Squared error over standing still, and a little for what is far from where it began.
+    let cost = |p: &[f64; COUNT]| -> f64 {
+        if p.iter().zip(&least).any(|(x, least)| x < least) {
+            return f64::INFINITY;
+        }
+        let Some(mut replay) = Robot::from_toml(&text(p)).ok().and_then(|robot| Replay::new(&robot, Side::Gold).ok()) else {
+            return f64::INFINITY;
+        };
+        let rms = [replay.rms(&train, WINDOW), replay.rms(&between, WINDOW)];
+        let error: f64 =
+            (0..2).flat_map(|part| (0..3).map(move |i| (part, i))).map(|(part, i)| (rms[part][i] / still[part][i]).powi(2)).sum();
+        let far: f64 = (0..COUNT).map(|i| ((p[i] - begin[i]) / (6.0 * size[i])).powi(2)).sum();
+        0.5 * error + 0.002 * far
+    };
+    let mut random = Random::new(SEED, 7);
+    let (mut best, mut lowest) = (begin, cost(&begin));
+    let (mut step_size, mut last) = (0.3_f64, [0.0; COUNT]);
+    for tried in 0..TRIES {
+        // Few numbers or many at a time; now and then again where it went well.
+        let share = 0.15 + 0.6 * random.between(0.0, 1.0).powi(2);
+        let mut step: [f64; COUNT] = std::array::from_fn(|i| {
+            let (moves, by) = (random.between(0.0, 1.0) < share, random.normal());
+            if moves { step_size * size[i] * by } else { 0.0 }
+        });
+        if tried % 5 == 4 {
+            step = last.map(|x| x * random.between(0.2, 1.5));
+        }
+        let there = std::array::from_fn(|i| best[i] + step[i]);
+        let found = cost(&there);
+        if found < lowest {
+            (best, lowest, last) = (there, found, step);
+            step_size = (1.15 * step_size).min(0.6);
+        } else {
+            step_size = (0.985 * step_size).max(0.01);
+        }
+        if tried % 200 == 199 {
+            eprintln!("{}: {lowest:.4}", tried + 1);
+        }
+    }
+    let robot = Robot::from_toml(&text(&best)).expect("robot");
     for (name, part) in [("fitted part", &train), ("rest", &rest), ("all", &record)] {
         let rms = Replay::new(&robot, Side::Gold).expect("plant").rms(part, WINDOW);
         eprintln!(
@@ -80,5 +130,5 @@ fn main() {
             standing_still_rms(part, WINDOW)
         );
     }
-    print!("{}", text(&p));
+    print!("{}", text(&best));
 }
