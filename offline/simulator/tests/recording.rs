@@ -80,11 +80,11 @@ fn longer_free_runs_of_the_nominal_plant_stay_closer_than_the_origins_simulator(
             (rms(&Robot::nominal(), window), rms(&fitted(), window), standing_still_rms(&record, window));
         println!("{} s: nominal {nominal:.1?}, fitted {fitted:.1?}, standing still {still:.1?} rad RMS", window / 1000);
         for motor in 0..3 {
-            // The origin's free run over the whole recording (issue 3). The fitted set was fitted over one second at a time: over
-            // fourteen its motor 1 runs away, as an open loop under gravity may.
+            // The origin's free run over the whole recording (issue 3). The fitted set was fitted over one second at a time and a little
+            // over five: over fourteen its motor 1 drifts away, as an open loop under gravity may.
             let origin = [98.0, 394.0, 129.0][motor];
             assert!(nominal[motor] < origin / 3.0, "motor {}: {}", motor + 1, nominal[motor]);
-            assert!(window > 5000 || fitted[motor] < 1.1 * still[motor], "motor {}: {}", motor + 1, fitted[motor]);
+            assert!(window > 5000 || fitted[motor] < still[motor], "motor {}: {}", motor + 1, fitted[motor]);
         }
     }
 }
