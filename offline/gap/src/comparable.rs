@@ -5,7 +5,7 @@ use gap_report::{DataQuality, Level};
 
 use crate::nominal::{mean, range, rms};
 use crate::robot::Robot;
-use crate::run::{Both, Run, alike, common};
+use crate::run::{Both, Run, alike, apart, common};
 
 /// Times a joint's own range that nothing moves: degrees for radians are 57 times, millimetres for metres 1000.
 const BEYOND_RANGE: f64 = 8.0;
@@ -27,12 +27,11 @@ const SAME_TORQUE: f64 = 0.95;
 pub(crate) fn elsewhere(robot: &Robot, real: &Run, sim: &Run) -> Option<DataQuality> {
     let (real, sim) = common(real, sim).ok()?;
     let n = robot.joint_count();
-    let apart = |j: usize| {
-        let middle = mean(&real.position[j]);
-        let spread = rms(real.position[j].iter().map(|x| x - middle));
-        rms(real.position[j].iter().zip(&sim.position[j]).map(|(a, b)| a - b)) / spread.max(1e-9)
+    let times = |j: usize| {
+        let (distance, spread) = apart(&real, &sim, j);
+        distance / spread.max(1e-9)
     };
-    let far: Vec<(usize, f64)> = (0..n).map(|j| (j, apart(j))).filter(|(_, apart)| *apart > ELSEWHERE).collect();
+    let far: Vec<(usize, f64)> = (0..n).map(|j| (j, times(j))).filter(|(_, times)| *times > ELSEWHERE).collect();
     let driven =
         real.torque.as_ref().zip(sim.torque.as_ref()).is_some_and(|(real, sim)| {
             (0..n).all(|j| correlation_and_scale(&real[j], &sim[j]).is_some_and(|(c, _)| c > SAME_TORQUE))

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{Candidate, TOOL_LENGTH, TOOL_TWIST, direction};
+use crate::hypothesis::{Candidate, LATE_COUPLING, TOOL_LENGTH, TOOL_TWIST, direction};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -145,9 +145,6 @@ fn named(found: &Found, candidate: &Candidate) -> String {
     let at = if places.is_empty() { String::new() } else { format!(" of {}", places.join(" and ")) };
     format!("{}{at}", candidate.family.physics.replace('_', " "))
 }
-
-/// Form of a coupling by a cable that has play itself.
-const LATE_COUPLING: &str = "position, with play";
 
 /// The offset of the joint that goes with a ratio or a coupling, which is right elsewhere than where the simulator has it: a ratio where
 /// the joint was homed, a coupling at zero.

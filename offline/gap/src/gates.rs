@@ -7,7 +7,7 @@ use recordings::Recording;
 use crate::motion::Motion;
 use crate::nominal::{Nominal, rms};
 use crate::robot::Robot;
-use crate::run::{Both, Run};
+use crate::run::{Both, Run, apart};
 
 /// Speed that counts as motion, of the largest speed.
 const MOVING: f64 = 0.05;
@@ -157,9 +157,8 @@ pub(crate) fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<
 fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
     (0..robot.joint_count())
         .filter_map(|j| {
-            let spread = |s: &[f64]| { let mean = crate::nominal::mean(s); rms(s.iter().map(|x| x - mean)) };
-            let apart = rms(real.position[j].iter().zip(&sim.position[j]).map(|(a, b)| a - b));
-            let usual = spread(&real.position[j]).max(1e-9);
+            let (apart, spread) = apart(real, sim, j);
+            let usual = spread.max(1e-9);
             (apart > 2.0 * usual).then(|| {
                 let message = format!(
                     "the simulated {} is {:.1} times its own travel away from the recorded one: another robot, other commands, or a free run",

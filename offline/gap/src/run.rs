@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use recordings::Recording;
 
+use crate::nominal::{mean, rms};
 use crate::robot::Robot;
 
 /// Longest stretch without a value that is bridged by a line; what lies around a longer one is left out, s.
@@ -493,11 +494,17 @@ const APART: f64 = 0.25;
 /// Is one the same motion as the other at the same time, so that their torques may be compared sample by sample?
 pub fn alike(real: &Run, sim: &Run) -> bool {
     let Ok((real, sim)) = common(real, sim) else { return false };
-    real.position.iter().zip(&sim.position).all(|(a, b)| {
-        let mean = crate::nominal::mean(a);
-        let spread = crate::nominal::rms(a.iter().map(|x| x - mean));
-        crate::nominal::rms(a.iter().zip(b).map(|(a, b)| a - b)) <= APART * spread.max(1e-4)
+    (0..real.position.len()).all(|j| {
+        let (distance, spread) = apart(&real, &sim, j);
+        distance <= APART * spread.max(1e-4)
     })
+}
+
+/// Distance of a joint's two motions, sample by sample, and the recording's own spread, RMS, rad or m.
+pub fn apart(real: &Run, sim: &Run, joint: usize) -> (f64, f64) {
+    let (a, b) = (&real.position[joint], &sim.position[joint]);
+    let middle = mean(a);
+    (rms(a.iter().zip(b).map(|(a, b)| a - b)), rms(a.iter().map(|x| x - middle)))
 }
 
 /// Share of the recording's own jitter from which on a simulation's torque is not that of a simulation.

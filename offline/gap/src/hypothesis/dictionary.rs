@@ -174,19 +174,15 @@ impl<'a> Dictionary<'a> {
     /// Deflections of the joints by torques at them: each loads the cables that hold it, `f = C⁻ᵀ τ`, those give way by their compliance, and
     /// `A⁻¹ m` takes that for motion of every joint that is read through them, `C⁻¹`.
     fn stretched_by(&self, torques: &[Option<Vec<f64>>]) -> Vec<Option<Vec<f64>>> {
-        let (n, shares) = (self.joints(), &self.strain_shares);
-        let sum = |weight: &dyn Fn(usize) -> f64, series: &[Option<Vec<f64>>]| {
-            let mut out: Option<Vec<f64>> = None;
-            for (k, series) in series.iter().enumerate().filter(|(k, _)| weight(*k) != 0.0) {
-                let Some(series) = series else { continue };
-                let out = out.get_or_insert_with(|| vec![0.0; series.len()]);
-                out.iter_mut().zip(series).for_each(|(out, x)| *out += weight(k) * x);
-            }
-            out
-        };
+        let shares = &self.strain_shares;
         let compliance = |drive: usize| self.problem.nominal.compliance[drive][0];
-        let strains: Vec<_> = (0..n).map(|drive| sum(&|joint| compliance(drive) * shares[(joint, drive)], torques)).collect();
-        (0..n).map(|joint| sum(&|drive| shares[(joint, drive)], &strains)).collect()
+        let strain = |drive: usize| weighted(&|joint| compliance(drive) * shares[(joint, drive)], torques);
+        self.read_through(&(0..self.joints()).map(strain).collect::<Vec<_>>())
+    }
+
+    /// Deflections of the joints by strains of the drives' cables: joints whose position is read through others' cables see their share.
+    fn read_through(&self, strains: &[Option<Vec<f64>>]) -> Vec<Option<Vec<f64>>> {
+        (0..self.joints()).map(|joint| weighted(&|drive| self.strain_shares[(joint, drive)], strains)).collect()
     }
 
     /// Deflections `A⁻¹ m - q` of the joints in addition.
@@ -203,14 +199,11 @@ impl<'a> Dictionary<'a> {
         self.deflection(&all)
     }
 
-    /// A deflection of one drive's cable: joints whose position is read through others' cables see their share.
+    /// A deflection of one drive's cable, as [`Dictionary::read_through`] has it.
     pub fn strain_of(&self, drive: usize, series: Vec<f64>) -> Column {
-        let n = self.joints();
-        let share = |joint: usize| self.strain_shares[(joint, drive)];
-        let of = |joint: usize| (share(joint) != 0.0).then(|| series.iter().map(|x| share(joint) * x).collect());
-        let mut all: Vec<Option<Vec<f64>>> = (0..n).map(|joint| if joint == drive { None } else { of(joint) }).collect();
-        all[drive] = Some(series);
-        self.deflection(&all)
+        let mut strains = vec![None; self.joints()];
+        strains[drive] = Some(series);
+        self.deflection(&self.read_through(&strains))
     }
 
     /// A torque of one joint; not at the link: of its drive, which its cables carry to the joints that they pass.
@@ -276,6 +269,17 @@ fn nearest(rows: &[usize], sample: usize) -> usize {
     let after = rows.partition_point(|row| *row < sample);
     let before = after.saturating_sub(1);
     if after < rows.len() && rows[after] - sample < sample.saturating_sub(rows[before]) { after } else { before }
+}
+
+/// Sum of series, each times its weight; none where none of them is there.
+fn weighted(weight: &dyn Fn(usize) -> f64, series: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
+    let mut out: Option<Vec<f64>> = None;
+    for (k, series) in series.iter().enumerate().filter(|(k, _)| weight(*k) != 0.0) {
+        let Some(series) = series else { continue };
+        let out = out.get_or_insert_with(|| vec![0.0; series.len()]);
+        out.iter_mut().zip(series).for_each(|(out, x)| *out += weight(k) * x);
+    }
+    out
 }
 
 #[cfg(test)]

@@ -24,6 +24,8 @@ const HELD: [f64; 2] = [0.0, 0.9];
 const ALIKE: [f64; 2] = [0.5, 0.85];
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
 const MOST_ALIKE: f64 = 0.93;
+/// The form of a coupling by a cable that has play itself.
+pub(crate) const LATE_COUPLING: &str = "position, with play";
 /// A spring to the ground whose force has a memory.
 pub(crate) const GROUND: &str = "to the ground";
 /// Bouc-Wen, the cable as stiff as in the simulation.
@@ -446,7 +448,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let widths = COUPLED_WIDTHS.map(|share| share * dictionary.travel(i));
             let mut bounds = vec![small];
             bounds.resize(2 + widths.len(), Bound::Free);
-            let family = Family::fixed("joint_coupling", &pair, "position, with play", TRANSMISSION, &bounds, move |d| {
+            let family = Family::fixed("joint_coupling", &pair, LATE_COUPLING, TRANSMISSION, &bounds, move |d| {
                 let late = widths.iter().map(|width| d.strain_of(j, lag(d, i, *width)));
                 std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
             });
