@@ -8,6 +8,7 @@ use crate::motion::Motion;
 use crate::nominal::{Nominal, rms};
 use crate::robot::Robot;
 use crate::run::{Both, Run, apart};
+use crate::saturation::Saturated;
 
 /// Speed that counts as motion, of the largest speed.
 const MOVING: f64 = 0.05;
@@ -19,6 +20,7 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
         all.extend(gaps(real));
+        all.extend(saturated(robot, real));
         all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
@@ -126,7 +128,8 @@ fn repeated(run: &Run) -> Option<DataQuality> {
 fn gaps(run: &Run) -> Vec<DataQuality> {
     let share = 100.0 * run.mask.iter().filter(|masked| **masked).count() as f64 / run.len().max(1) as f64;
     let masked = (share > 0.0).then(|| {
-        let message = format!("{share:.1} % of the samples were not recorded (empty cells, lost rows) and are left out");
+        let why = if run.saturated.is_empty() { "" } else { ", or have a torque at its limit," };
+        let message = format!("{share:.1} % of the samples were not recorded (empty cells, lost rows){why} and are left out");
         let level = if share > 1.0 { Level::Warn } else { Level::Ok };
         DataQuality::new("gaps", level, message).run(run.id.clone()).value(share, "%")
     });
@@ -135,6 +138,23 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
         DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
     });
     masked.into_iter().chain(left_out).collect()
+}
+
+/// Torques that stand at a limit.
+fn saturated(robot: &Robot, run: &Run) -> Vec<DataQuality> {
+    let of = |one: &Saturated| {
+        let limits = one.limits.iter().map(|limit| format!("{limit:.4}")).collect::<Vec<_>>().join(" and ");
+        let share = 100.0 * one.share;
+        let done = if one.left_out {
+            "these samples are left out; move slower, or with less load"
+        } else {
+            "a limit, or a torque commanded in steps: nothing is left out; if it is a limit, move slower or with less load"
+        };
+        let message =
+            format!("the torque of {} stands at {limits} in {share:.1} % of the samples: {done}", robot.joints[one.joint]);
+        DataQuality::new("saturation", Level::Warn, message).run(run.id.clone()).value(share, "%")
+    };
+    run.saturated.iter().map(of).collect()
 }
 
 /// Joints of a recording that the robot does not have.

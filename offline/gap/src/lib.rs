@@ -16,6 +16,7 @@ pub mod problem;
 pub mod refine;
 pub mod robot;
 pub mod run;
+pub mod saturation;
 pub mod score;
 pub mod search;
 

@@ -230,6 +230,7 @@ mod tests {
             tip: Some([series.clone(), series.clone(), series]),
             mask,
             left_out: Vec::new(),
+            saturated: Vec::new(),
         };
         let motion = Motion::new(run, Band::SLOW);
         let margin = motion.window.margin();

@@ -5,6 +5,7 @@ use recordings::Recording;
 
 use crate::nominal::{mean, rms};
 use crate::robot::Robot;
+use crate::saturation::{self, Saturated};
 
 /// Longest stretch without a value that is bridged by a line; what lies around a longer one is left out, s.
 const HOLE_S: f64 = 0.005;
@@ -135,10 +136,13 @@ pub struct Run {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
     pub tip: Option<[Vec<f64>; 3]>,
-    /// Samples that were not recorded, in which the series are bridged: nothing may be concluded from them.
+    /// Samples that were not recorded, in which the series are bridged, or in which a torque stands at its limit: nothing may be concluded
+    /// from them.
     pub mask: Vec<bool>,
     /// Columns left out because most of their cells are empty.
     pub left_out: Vec<String>,
+    /// Torques that stand at a limit.
+    pub saturated: Vec<Saturated>,
 }
 
 /// A recording and the simulation of the same commands, if there is one.
@@ -248,10 +252,15 @@ impl Run {
                 });
             }
         };
+        // Torques as they were recorded, before motors become joints: that is where a limit shows.
+        let mut limited = (Vec::new(), vec![false; position[0].len()]);
+        let mut see = |tau: Vec<Vec<f64>>| {
+            limited = saturation::of(&tau, motor.as_ref().unwrap_or(&position));
+            tau
+        };
         let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
-        let motor_torque = all(&[&|j| format!("tau_{}_nm", j + 1)])
-            .filter(|_| from_motors || recording.column("jtau_1_nm").is_none())
-            .map(at_joints);
+        let motor_torque =
+            all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none());
         let joint_torque = || {
             let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
             all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
@@ -263,7 +272,12 @@ impl Run {
             let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
             let torque =
                 counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
-            Some(at_joints(torque.collect()))
+            Some(torque.collect())
+        };
+        let torque = match (motor_torque, joint_torque()) {
+            (Some(motors), _) => Some(at_joints(see(motors))),
+            (None, Some(joints)) => Some(see(joints)),
+            (None, None) => counted().map(|motors| at_joints(see(motors))),
         };
         let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
         let mut tip = match tip {
@@ -284,16 +298,17 @@ impl Run {
             start_s: clock.start_s,
             since_s: 0.0,
             dt_s: clock.dt_s,
-            mask: vec![false; position[0].len()],
+            mask: limited.1,
             points: clock.points,
             drive: combine(&robot.coupling(), &position),
             position,
-            torque: motor_torque.or_else(joint_torque).or_else(counted),
+            torque,
             truth,
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
             left_out: Vec::new(),
+            saturated: limited.0,
         };
         made.alive(robot)?;
         made.bridge();
@@ -410,6 +425,7 @@ impl Run {
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(series)),
             mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
             left_out: self.left_out.clone(),
+            saturated: self.saturated.clone(),
         }
     }
 
@@ -432,6 +448,7 @@ impl Run {
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
             mask: self.mask[from..to].to_vec(),
             left_out: self.left_out.clone(),
+            saturated: self.saturated.clone(),
         }
     }
 }

@@ -75,6 +75,29 @@ fn a_channel_that_one_run_lacks_is_left_out_of_all() {
 }
 
 #[test]
+fn a_torque_that_stands_at_a_limit_is_left_out_there_and_told() {
+    let folder = Folder::new("sides-limit");
+    let case = friction(&folder);
+    // The sensor ends at what the second joint reaches now and then, far below what its friction and weight ask of it.
+    let limit = {
+        let all = lines(&case.real[0]);
+        let at = all[0].split(',').position(|name| name == "tau_2_nm").expect("torque");
+        let mut sizes: Vec<f64> =
+            all[1..].iter().map(|row| row.split(',').nth(at).expect("a cell").parse::<f64>().expect("a number").abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes[sizes.len() * 9 / 10]
+    };
+    let cut = |column: &str, value: f64| Some(if column == "tau_2_nm" { value.clamp(-limit, limit) } else { value });
+    let real = case.real.iter().enumerate().map(|(k, path)| with_columns(&folder, &format!("cut-{k}.csv"), path, cut)).collect();
+    let report = Case { real, sim: case.sim.clone(), robot: case.robot.clone() }.judged(&folder.file("out"));
+    let said = told(&report, "saturation");
+    assert!(said.contains(&format!("{limit:.4}")) && said.contains("left out"), "{said}");
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "coulomb_friction", "{}", report.summary);
+    near(first, "f_c", FRICTION, 0.15);
+}
+
+#[test]
 fn without_a_common_channel_there_is_one_line() {
     let folder = Folder::new("sides-none");
     let case = friction(&folder);

@@ -140,9 +140,15 @@ impl<'a> Dictionary<'a> {
         (high - low).max(1e-9)
     }
 
-    /// Load on the cable of a joint at the grid.
+    /// Load of a joint at the grid: what its links ask of the drives.
     pub fn load(&self, joint: usize) -> Vec<f64> {
         self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
+    }
+
+    /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
+    pub fn cable_load(&self, drive: usize) -> Vec<f64> {
+        let shares = self.strain_shares.column(drive);
+        self.at_grid(|r, _, k| shares.iter().zip(&self.problem.loads[r][k].link).map(|(share, link)| share * link).sum())
     }
 
     /// Values of the grid carried over to the tip's rows: those of the nearest row.

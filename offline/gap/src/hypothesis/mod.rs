@@ -11,8 +11,8 @@ mod transmission;
 mod unknown;
 
 pub(crate) use transmission::{GROUND, LATE_COUPLING, OWN_STIFFNESS};
-pub(crate) use unknown::HARDENING;
 pub use unknown::UNMODELLED;
+pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 
 use std::sync::Arc;
 
@@ -198,6 +198,9 @@ impl Family {
 /// Edges of windows closer than that are one, s: an effect takes its time to come, and its edge is known no better.
 const SAME_EDGE_S: f64 = 0.3;
 
+/// How well an edge is known, s.
+const EDGE_KNOWN_S: f64 = 0.05;
+
 /// A family at one shape and window, its columns made.
 #[derive(Debug, Clone)]
 pub struct Candidate {
@@ -274,6 +277,19 @@ impl Candidate {
             }
         }
         shows
+    }
+
+    /// Of each block, whether it begins or ends there, or is still on its way: what is left of such a block says nothing of the others.
+    pub fn blocks_of_edges(&self, problem: &crate::problem::Problem) -> Vec<bool> {
+        let mut edges = vec![false; problem.block_count];
+        let finite: Vec<f64> = self.window.into_iter().flatten().filter(|t| t.is_finite()).collect();
+        for (cell, blocks) in problem.cells.iter().zip(&problem.blocks) {
+            for (&(r, i), block) in cell.rows.iter().zip(blocks) {
+                let t = problem.pairs[r].real.run.elapsed_s(i);
+                edges[*block] |= finite.iter().any(|edge| (edge - EDGE_KNOWN_S..edge + SAME_EDGE_S).contains(&t));
+            }
+        }
+        edges
     }
 
     /// Does every coefficient reach some residual?

@@ -3,6 +3,7 @@
 use super::dictionary::{Dictionary, minus, size, times};
 use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
+use crate::run::Run;
 
 /// Widths of play, shares of a joint's travel.
 const PLAY: [f64; 14] = [0.0003, 0.0006, 0.001, 0.0018, 0.003, 0.005, 0.008, 0.012, 0.018, 0.027, 0.04, 0.06, 0.09, 0.14];
@@ -30,8 +31,14 @@ pub(crate) const LATE_COUPLING: &str = "position, with play";
 pub(crate) const GROUND: &str = "to the ground";
 /// Bouc-Wen, the cable as stiff as in the simulation.
 pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness";
+/// Times the furthest that a joint is seen, and the range that it has, within which it was homed.
+const HOMED: f64 = 2.0;
 /// Time constants of creep, s.
 const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
+/// Over so many time constants its load is averaged where its past is not known.
+const AVERAGED: f64 = 2.0;
+/// Times its load to which a cable may have crept at the start: it may have held more.
+const STARTED: f64 = 5.0;
 /// Periods of an eccentric pulley, from and to as shares of the travel, and how many. Where the recording shows a small part of what the
 /// joint can do they go on to that: a pulley is as large as the joint needs it.
 const PERIODS: (f64, f64, usize) = (0.03, 2.5, 36);
@@ -66,10 +73,10 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         &[Bound::Between(0.7, 1.4)],
         &[("b", true)],
         product(&[&PLAY.map(|share| share * travel)]),
-        move |d, s| vec![d.strain_of(j, lag(d, j, s[0]))],
+        move |d, s| vec![d.strain_of(j, lag(d, s[0], &|run| &run.drive[j]))],
     ));
     // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
-    if size(&dictionary.load(j)) < 1e-9 {
+    if size(&dictionary.cable_load(j)) < 1e-9 {
         let widths = WIDTHS.map(|share| share * travel);
         let family = Family::fixed(
             "cable_hysteresis",
@@ -80,14 +87,14 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             move |d| {
                 widths
                     .iter()
-                    .map(|width| d.strain_of(j, lag(d, j, *width)))
+                    .map(|width| d.strain_of(j, lag(d, *width, &|run| &run.drive[j])))
                     .chain([d.deflection_of(j, minus(&position(d, j))), offset(d, j)])
                     .collect()
             },
         );
         all.push(family.penalised(3.0));
     }
-    let usual = size(&dictionary.load(j)).max(1e-9);
+    let usual = size(&dictionary.cable_load(j)).max(1e-9);
     // A damped link takes its time from one side to the other: the impulse of its load that carries it across is the shape.
     let impulses = CARRIED_S.map(|time| time * usual);
     let carried = Family::shaped(
@@ -110,7 +117,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &[Bound::Positive],
             &[("crossing", true)],
             product(&[&CROSSING.map(|share| share * usual)]),
-            move |d, s| vec![d.strain_of(j, d.load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
+            move |d, s| vec![d.strain_of(j, d.cable_load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
         )
         .penalised(1.5),
     );
@@ -118,7 +125,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
 
 /// Where a link stands in a play of one, between -1/2 and 1/2, whose load carries it across against a damper.
 fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
-    let load = dictionary.load(j);
+    let load = dictionary.cable_load(j);
     let mut out: Vec<f64> = Vec::with_capacity(load.len());
     let mut before: Option<(usize, f64, f64)> = None;
     for (&(r, i, _), now) in dictionary.grid.iter().zip(&load) {
@@ -137,10 +144,10 @@ fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
     out
 }
 
-/// How far the motor runs ahead of a joint with play.
-fn lag(dictionary: &Dictionary, j: usize, width: f64) -> Vec<f64> {
+/// How far what is moved through a play lags behind what moves it.
+fn lag(dictionary: &Dictionary, width: f64, moves: &dyn Fn(&Run) -> &[f64]) -> Vec<f64> {
     dictionary.smoothed(|r| {
-        let series = &dictionary.problem.pairs[r].real.run.position[j];
+        let series = moves(&dictionary.problem.pairs[r].real.run);
         let mut inner = series[0];
         series
             .iter()
@@ -153,12 +160,12 @@ fn lag(dictionary: &Dictionary, j: usize, width: f64) -> Vec<f64> {
 }
 
 fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
-    let usual = size(&dictionary.load(j));
+    let usual = size(&dictionary.cable_load(j));
     if usual < 1e-9 {
         return;
     }
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
-        vec![d.strain_of(j, d.load(j))]
+        vec![d.strain_of(j, d.cable_load(j))]
     }));
     let numbers = |a: bool| [("a", a), ("yield", true), ("n", true), ("start", true), ("g", true)];
     let yields = YIELD.map(|share| share * usual);
@@ -173,7 +180,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &numbers(true),
             product(&[&STRAIGHT, &yields, &POWER, &HELD, &ALIKE]),
             move |d, s| {
-                let load = d.load(j);
+                let load = d.cable_load(j);
                 vec![d.strain_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.strain_of(j, load)]
             },
         )
@@ -192,7 +199,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &numbers(false),
             product(&[&STRAIGHT_OWN, &yields, &POWER, &HELD, &ALIKE]),
             move |d, s| {
-                let load = d.load(j);
+                let load = d.cable_load(j);
                 let per_share = own / (1.0 - s[0]);
                 let beyond = |run: &[f64]| bouc_wen(run, s).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect();
                 vec![d.strain_of(j, per_run(d, &load, beyond))]
@@ -205,21 +212,23 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         };
         all.push(family.limited(&limits).following(follow).penalised(3.0));
     }
-    for (form, settled) in [("settled at the start", true), ("fresh at the start", false)] {
-        all.push(
-            Family::shaped(
-                "cable_creep",
-                &[j],
-                form,
-                TRANSMISSION,
-                &[Bound::Positive],
-                &[("T_k", true)],
-                product(&[&CREEP_S]),
-                move |d, s| vec![d.strain_of(j, crept(d, j, s[0], settled))],
-            )
-            .penalised(1.0),
-        );
+    let times = product(&[&CREEP_S]);
+    for (form, settled) in [("settled at the start", 1.0), ("fresh at the start", 0.0)] {
+        let columns = move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], settled))];
+        let bounds = [Bound::Positive];
+        let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &bounds, &[("T_k", true)], times.clone(), columns);
+        all.push(family.penalised(1.0));
     }
+    // Where it has crept a part of the way: what the load at the start had still to do dies away.
+    let columns = move |d: &Dictionary, s: &[f64]| {
+        let (fresh, settled) = (crept(d, j, s[0], 0.0), crept(d, j, s[0], 1.0));
+        let start = settled.iter().zip(&fresh).map(|(settled, fresh)| settled - fresh).collect();
+        vec![d.strain_of(j, fresh), d.strain_of(j, start)]
+    };
+    let bounds = [Bound::Positive, Bound::Within(STARTED)];
+    let family =
+        Family::shaped("cable_creep", &[j], "under way at the start", TRANSMISSION, &bounds, &[("T_k", true)], times, columns);
+    all.push(family.penalised(2.0));
     all.push(
         Family::shaped(
             "thermal_drift",
@@ -235,25 +244,31 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     );
 }
 
-/// Load behind a first-order lag.
-fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: bool) -> Vec<f64> {
+/// Load behind a first-order lag, which at the start of a run is where it stood so long that it settled to this share of its load. Of the
+/// rest of a run, whose beginning is not there, the load was what it is now on the average.
+fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f64> {
     // Faster creep is stretch.
     let time_s = time_s.max(0.5 * CREEP_S[0]);
-    let mut state = 0.0;
-    dictionary
-        .grid
-        .iter()
-        .zip(dictionary.load(j))
-        .map(|(&(r, _, k), load)| {
-            let keep = (-row_period(&dictionary.problem.pairs[r].real) / time_s).exp();
-            state = match k {
-                0 if settled => load,
-                0 => 0.0,
-                _ => keep * state + (1.0 - keep) * load,
-            };
-            state
-        })
-        .collect()
+    let load = dictionary.cable_load(j);
+    let mut out: Vec<f64> = Vec::with_capacity(load.len());
+    for (row, &(r, i, k)) in dictionary.grid.iter().enumerate() {
+        let motion = &dictionary.problem.pairs[r].real;
+        let state = if k > 0 {
+            let keep = (-row_period(motion) / time_s).exp();
+            keep * out[row - 1] + (1.0 - keep) * load[row]
+        } else if motion.run.since_s > 0.0 {
+            let seen = dictionary.grid[row..]
+                .iter()
+                .take_while(|(other, at, _)| *other == r && (at - i) as f64 * motion.run.dt_s < AVERAGED * time_s);
+            let usual = crate::nominal::mean(&load[row..row + seen.count()]);
+            let left = (-motion.run.since_s / time_s).exp();
+            (1.0 - left) * usual + left * settled * load[row]
+        } else {
+            settled * load[row]
+        };
+        out.push(state);
+    }
+    out
 }
 
 /// Seconds between rows.
@@ -357,9 +372,15 @@ fn offset(dictionary: &Dictionary, j: usize) -> Column {
     dictionary.deflection_of(j, vec![-1.0; dictionary.grid.len()])
 }
 
+/// How far from zero a joint may have been homed, rad or m: what would be 0 further away is no error that grows with the way, but an offset.
+fn homed_within(dictionary: &Dictionary, j: usize) -> f64 {
+    let furthest = position(dictionary, j).iter().fold(0.0, |most: f64, q| most.max(q.abs()));
+    HOMED * (furthest + dictionary.problem.robot.range(j))
+}
+
 fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
-    let (small, free) = (Bound::Between(-0.5, 0.5), Bound::Free);
+    let (small, free, homed) = (Bound::Between(-0.5, 0.5), Bound::Free, Bound::Within(homed_within(dictionary, j)));
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
     all.push(
         Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5),
@@ -374,17 +395,24 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         .penalised(0.5),
     );
     all.push(
-        Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, free], move |d| {
+        Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, homed], move |d| {
             vec![ratio(d), offset(d, j)]
         })
         .penalised(1.5),
     );
     all.push(
-        Family::fixed("transmission_ratio", &[j], "about where it was homed, torque too", TRANSMISSION, &[small, free], move |d| {
-            let mut column = ratio(d);
-            column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
-            vec![column, offset(d, j)]
-        })
+        Family::fixed(
+            "transmission_ratio",
+            &[j],
+            "about where it was homed, torque too",
+            TRANSMISSION,
+            &[small, homed],
+            move |d| {
+                let mut column = ratio(d);
+                column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
+                vec![column, offset(d, j)]
+            },
+        )
         .penalised(1.5),
     );
     let travel = dictionary.travel(j);
@@ -433,12 +461,12 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let small = Bound::Between(-0.5, 0.5);
     for i in (0..dictionary.joints()).filter(|i| *i != j) {
         let coupled = move |d: &Dictionary| d.strain_of(j, position(d, i));
-        let pair = [j, i];
+        let (pair, homed) = ([j, i], Bound::Within(homed_within(dictionary, i)));
         all.push(
             Family::fixed("joint_coupling", &pair, "position", TRANSMISSION, &[small], move |d| vec![coupled(d)]).penalised(1.0),
         );
         all.push(
-            Family::fixed("joint_coupling", &pair, "position about a place", TRANSMISSION, &[small, Bound::Free], move |d| {
+            Family::fixed("joint_coupling", &pair, "position about a place", TRANSMISSION, &[small, homed], move |d| {
                 vec![coupled(d), offset(d, j)]
             })
             .penalised(1.5),
@@ -449,7 +477,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let mut bounds = vec![small];
             bounds.resize(2 + widths.len(), Bound::Free);
             let family = Family::fixed("joint_coupling", &pair, LATE_COUPLING, TRANSMISSION, &bounds, move |d| {
-                let late = widths.iter().map(|width| d.strain_of(j, lag(d, i, *width)));
+                let late = widths.iter().map(|width| d.strain_of(j, lag(d, *width, &|run| &run.position[i])));
                 std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
             });
             all.push(family.penalised(4.0));
@@ -458,7 +486,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
                 // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
                 let mut column = coupled(d);
-                column.push(d.problem.cell(Channel::JointTorque, i), &minus(&d.load(j)));
+                column.push(d.problem.cell(Channel::JointTorque, i), &minus(&d.cable_load(j)));
                 vec![column]
             })
             .penalised(1.0),

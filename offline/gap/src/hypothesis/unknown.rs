@@ -9,6 +9,8 @@ use crate::problem::Channel;
 pub const UNMODELLED: &str = "unmodelled";
 /// Forms of a cable that hardens, or has slack: a soft cable and more.
 pub(crate) const HARDENING: [&str; 2] = ["load, bent", "load beyond a level"];
+/// The form of steps in time, which say themselves when they come.
+pub(crate) const STEPS_IN_TIME: &str = "steps in time";
 /// Share of the largest load beyond which a cable is softer, to begin with.
 const SLACK: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 /// Periods of a wave, shares of the travel: from, to, how many.
@@ -65,7 +67,7 @@ fn push_friction(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
 /// A cable whose stiffness changes with its load: bent one way, or softer beyond a load.
 fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     const TRANSMISSION: Channel = Channel::Transmission;
-    let usual = dictionary.load(j).iter().fold(0.0_f64, |most, l| most.max(l.abs()));
+    let usual = dictionary.cable_load(j).iter().fold(0.0_f64, |most, l| most.max(l.abs()));
     if usual < 1e-9 {
         return;
     }
@@ -75,8 +77,8 @@ fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let l = l / usual;
             bent(l, s[0]) - l
         };
-        let load = d.load(j);
-        let column = |series: Vec<f64>| d.deflection_of(j, series);
+        let load = d.cable_load(j);
+        let column = |series: Vec<f64>| d.strain_of(j, series);
         vec![column(load.iter().map(less).collect()), column(load)]
     };
     let family = Family::shaped(
@@ -92,7 +94,7 @@ fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(family.penalised(8.0));
     let beyond = move |d: &Dictionary, s: &[f64]| {
         let soft = |l: &f64| l.signum() * (l.abs() - s[0]).max(0.0);
-        vec![d.deflection_of(j, d.load(j).iter().map(soft).collect())]
+        vec![d.strain_of(j, d.cable_load(j).iter().map(soft).collect())]
     };
     let shares = SLACK.map(|share| share * usual);
     let family = Family::shaped(
@@ -137,7 +139,7 @@ fn push_steps(dictionary: &Dictionary, j: usize, cell: usize, all: &mut Vec<Fami
         return;
     }
     let count = places.len();
-    let family = Family::fixed(UNMODELLED, &[j], "steps in time", Channel::Transmission, &vec![Bound::Free; count], move |d| {
+    let family = Family::fixed(UNMODELLED, &[j], STEPS_IN_TIME, Channel::Transmission, &vec![Bound::Free; count], move |d| {
         let step = |(id, from_s): &(String, f64)| {
             let since = |r: usize, i: usize| {
                 let run = &d.problem.pairs[r].real.run;
