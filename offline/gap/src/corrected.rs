@@ -267,7 +267,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
             let _ = parameters.0.remove("mu_theta");
             joint.map(Bound::Joint).ok_or("it has no joint")?
         }
-        ("motor_torque_scale", form) if form != "scale" && !parameters.0.contains_key("d_0") => {
+        ("motor_torque_scale", form) if form.ends_with("offset") && !parameters.0.contains_key("d_0") => {
             return Err("its offset is in counts of the amplifier, and the robot's file has no torque_constant_nm_a and \
                         counts_per_a of the drive"
                 .to_owned());

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::linear::{least_squares, solve};
 use crate::motion::{Motion, State};
 use crate::robot::Robot;
+use simulator::physics::smooth_sign;
 
 /// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
 const DRIVE_COLUMNS: usize = 4;
@@ -28,6 +29,10 @@ pub struct Nominal {
     pub compliance: Vec<[f64; 2]>,
     /// Per joint: friction behind the cable, viscous and dry, which loads the cable beside the link.
     pub link_friction: Vec<[f64; 2]>,
+    /// Speed over which the sign of that turns, rad/s or m/s; none: as steep as its noise allows.
+    pub link_sign_width: Vec<Option<f64>>,
+    /// Per drive, s: by how much its sensor and that of the joint come apart in time, as a share of the velocity in the deflection.
+    pub late_s: Vec<f64>,
     /// Per joint: what springs and cables pull with the first, second and third power of its position. All 0 but where the
     /// model was learnt from a recording.
     pub springs: Vec<[f64; SPRINGS]>,
@@ -58,6 +63,8 @@ impl Nominal {
             drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
             compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
             link_friction: vec![[0.0; 2]; n],
+            link_sign_width: vec![None; n],
+            late_s: vec![0.0; n],
             springs: vec![[0.0; SPRINGS]; n],
             usual_torque: vec![0.0; n],
             torque_error: vec![0.0; n],
@@ -130,7 +137,7 @@ impl Nominal {
                     {
                         // What loads the drive's cable, and how far it gives way.
                         row.fill(0.0);
-                        let (mut strain, mut rubbing) = (0.0, 0.0);
+                        let (mut strain, mut rubbing) = (-self.late_s[j] * run.drive_velocity[j][i], 0.0);
                         for k in 0..n {
                             strain += coupling[(j, k)] * deflection[k][i];
                             rubbing += shares[(k, j)] * self.rubbing(run, k, i);
@@ -218,7 +225,9 @@ impl Nominal {
         if viscous == 0.0 && dry == 0.0 {
             return 0.0;
         }
-        viscous * run.velocity[j][i] + dry * run.sign_at_link(j, i)
+        let sign =
+            self.link_sign_width[j].map_or_else(|| run.sign_at_link(j, i), |width| smooth_sign(run.quick(j, true)[i], width));
+        viscous * run.velocity[j][i] + dry * sign
     }
 
     /// Deflection `A⁻¹ m - q` of a joint under torques of the links: they load the cables, those give way, and other joints are read through
@@ -240,6 +249,11 @@ impl Nominal {
         let (coupling, shares) = (robot.coupling(), robot.strain_shares());
         let (mut load, mut seen) = (vec![Vec::new(); n], vec![Vec::new(); n]);
         let mut rubbed = vec![[Vec::new(), Vec::new()]; n];
+        let (mut with_own, mut turning) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+        let own = |j: usize, run: &Motion, i: usize| {
+            let [viscous, dry, width] = robot.drives[j].behind;
+            viscous * run.velocity[j][i] + dry * smooth_sign(run.quick(j, true)[i], width)
+        };
         for run in runs {
             let Some(deflection) = &run.deflection else { continue };
             for &i in &run.rows {
@@ -250,6 +264,8 @@ impl Nominal {
                     seen[j].push((0..n).map(|k| coupling[(j, k)] * deflection[k][i]).sum::<f64>());
                     rubbed[j][0].push(run.velocity[j][i]);
                     rubbed[j][1].push(run.sign_at_link(j, i));
+                    turning[j].push(run.drive_velocity[j][i]);
+                    with_own[j].push((0..n).map(|k| shares[(k, j)] * (at[k] + own(k, run, i))).sum::<f64>());
                 }
             }
         }
@@ -262,9 +278,33 @@ impl Nominal {
             let left = rms(x.iter().zip(y).map(|(x, y)| y - slope * x)) / rms(y.iter().copied());
             // A transmission that does not follow its load is taken for rigid.
             compliance[j] = [if left < 0.8 { slope.max(0.0) } else { 0.0 }, 0.0];
-            if let Some((slope, friction)) = with_friction(x, &rubbed[j], y).filter(|_| left < 0.8) {
+            self.late_s[j] = 0.0;
+            if left >= 0.8 {
+                continue;
+            }
+            if let Some((slope, friction)) = with_friction(x, &rubbed[j], y) {
                 compliance[j][0] = slope;
-                self.link_friction[j] = friction;
+                (self.link_friction[j], self.link_sign_width[j]) = (friction, None);
+            }
+            // The robot's own numbers, or dry friction alone, where they say more: a sensor that comes late adds a share of the velocity, which
+            // passes for viscous friction, mostly of the wrong sign.
+            let [viscous, dry] = self.link_friction[j];
+            let known = self.link_sign_width[j].is_some();
+            let rubs = |k: usize| if known { 0.0 } else { viscous * rubbed[j][0][k] + dry * rubbed[j][1][k] };
+            let mut least = rms((0..y.len()).map(|k| y[k] - compliance[j][0] * (x[k] + rubs(k))));
+            let own = fitted(&[&with_own[j], &turning[j]], y);
+            let learnt = fitted(&[x, &rubbed[j][1], &turning[j]], y);
+            if learnt.0 < LATE * least && learnt.1[0] > 0.0 && learnt.1[1] > 0.0 {
+                compliance[j][0] = learnt.1[0];
+                (self.link_friction[j], self.link_sign_width[j]) = ([0.0, learnt.1[1] / learnt.1[0]], None);
+                self.late_s[j] = learnt.1[2];
+                least = learnt.0;
+            }
+            if own.0 < least && own.1[0] > 0.0 {
+                let [viscous, dry, width] = robot.drives[j].behind;
+                compliance[j][0] = own.1[0];
+                (self.link_friction[j], self.link_sign_width[j]) = ([viscous, dry], Some(width));
+                self.late_s[j] = own.1[1];
             }
         }
         self.compliance = compliance;
@@ -274,18 +314,23 @@ impl Nominal {
 /// Share of the misfit of the load alone that friction behind the cable has to leave less than.
 const RUBS: f64 = 0.9;
 
+/// Share of the misfit that friction and a late sensor together have to leave less than.
+const LATE: f64 = 0.7;
+
+/// What is left of a series, RMS, and the coefficients of the columns.
+fn fitted(columns: &[&[f64]], seen: &[f64]) -> (f64, Vec<f64>) {
+    let at = least_squares(columns, seen);
+    let told = |k: usize| columns.iter().zip(&at).map(|(c, theta)| theta * c[k]).sum::<f64>();
+    (rms((0..seen.len()).map(|k| seen[k] - told(k))), at)
+}
+
 /// Compliance and friction (viscous, dry) from a deflection; none where friction explains little or would give energy.
 fn with_friction(load: &[f64], rubbed: &[Vec<f64>; 2], seen: &[f64]) -> Option<(f64, [f64; 2])> {
-    let misfit = |columns: &[&[f64]]| {
-        let at = least_squares(columns, seen);
-        let told = |k: usize| columns.iter().zip(&at).map(|(c, theta)| theta * c[k]).sum::<f64>();
-        (rms((0..seen.len()).map(|k| seen[k] - told(k))), at)
-    };
-    let (alone, _) = misfit(&[load]);
+    let (alone, _) = fitted(&[load], seen);
     let tries: [&[usize]; 3] = [&[0, 1], &[0], &[1]];
     for which in tries {
         let columns: Vec<&[f64]> = std::iter::once(load).chain(which.iter().map(|k| &rubbed[*k][..])).collect();
-        let (left, at) = misfit(&columns);
+        let (left, at) = fitted(&columns, seen);
         if at.iter().all(|x| *x > 0.0) && left < RUBS * alone {
             let mut friction = [0.0; 2];
             for (k, theta) in which.iter().zip(at.iter().skip(1)) {

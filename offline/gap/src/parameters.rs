@@ -70,7 +70,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             let scale = if form == "offset" { 1.0 } else { 1.0 / (1.0 + theta[0]) };
             let mut all = vec![named("kappa", "1", scale)];
             let per_count = robot.drives[joint].torque_per_count * robot.motor_from_joint[(joint, joint)];
-            if form != "scale" && per_count != 0.0 {
+            if form.ends_with("offset") && per_count != 0.0 {
                 all.push(named("d_0", "DAC", theta[theta.len() - 1] / per_count));
             }
             all
@@ -157,7 +157,7 @@ pub(crate) fn beside(
     match (family.physics, family.form) {
         ("thermal_drift", "position") => Some(("how far the position drifts until warm", theta[0], position)),
         ("thermal_drift", _) if nominal.drives[joint][2] <= 0.0 => Some(("how much friction changes until warm", theta[0], effort)),
-        ("motor_torque_scale", form) if form != "scale" && robot.drives[joint].torque_per_count == 0.0 => {
+        ("motor_torque_scale", form) if form.ends_with("offset") && robot.drives[joint].torque_per_count == 0.0 => {
             Some(("constant torque, of an amplifier whose counts are not known", theta[theta.len() - 1], effort))
         }
         _ => None,

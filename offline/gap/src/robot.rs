@@ -20,6 +20,8 @@ pub struct DriveNominal {
     pub torque_per_count: f64,
     /// Joint position where the motor stands at 0.
     pub offset: f64,
+    /// Friction behind the cable, which loads it: viscous, dry, and the speed over which its sign turns; all of it is in the two above, too.
+    pub behind: [f64; 3],
     /// Spring from the joint to the ground: stiffness, damping, rest position.
     pub ground: [f64; 3],
 }
@@ -33,6 +35,7 @@ impl Default for DriveNominal {
             stiffness: f64::INFINITY,
             torque_per_count: 0.0,
             offset: 0.0,
+            behind: [0.0, 0.0, 1.0],
             ground: [0.0; 3],
         }
     }
@@ -101,6 +104,7 @@ impl Robot {
                 stiffness: if drive.connection == Connection::Cable { drive.stiffness } else { f64::INFINITY },
                 torque_per_count: drive.torque_per_count_nm(),
                 offset: drive.offset,
+                behind: [drive.joint_viscous, drive.joint_coulomb, drive.joint_sign_width],
                 ground: [passive.stiffness, passive.damping, passive.rest],
             }
         });

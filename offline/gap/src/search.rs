@@ -37,6 +37,16 @@ const EDGES: usize = 12;
 /// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
 const ALWAYS: [&str; 1] = ["stribeck_friction"];
 
+/// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
+fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
+    let has_level = |candidate: &Candidate| match candidate.family.physics {
+        "coulomb_friction" | "stribeck_friction" => true,
+        "load_dependent_friction" => candidate.columns.len() > 1,
+        _ => false,
+    };
+    one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
+}
+
 /// May a form be there in a part of a run only? Steps would have an edge more than they say.
 fn comes_and_goes(family: &Family) -> bool {
     !ALWAYS.contains(&family.physics) && family.form != STEPS_IN_TIME
@@ -262,15 +272,18 @@ impl Search<'_, '_> {
         };
         let (_, with) = all(&self.scorer);
         let noise = self.noise_left(others, candidate, &self.scorer.fit(&with));
-        let mut shown = candidate.blocks(self.problem);
+        let shown = candidate.blocks(self.problem);
         let edges = candidate.blocks_of_edges(self.problem);
-        shown.iter_mut().zip(&edges).for_each(|(shown, edge)| *shown &= !edge);
         for noise in [window_noise(self.problem), noise] {
             let mut scorer = Scorer::new(self.problem, noise);
             let (base, with) = all(&scorer);
             let (before, after) = (scorer.fit(&base), scorer.fit(&with));
             scorer.temper(&with, &after);
-            let gain = scorer.gain_in(&before, &after, |b| shown[b]);
+            let mut gain = scorer.gain_in(&before, &after, |b| shown[b]);
+            if candidate.edges() > 0 {
+                let between = scorer.gain_in(&before, &after, |b| shown[b] && !edges[b]);
+                gain.error = gain.error.min(between.error);
+            }
             if best.is_none_or(|b| gain.nats > b.nats) {
                 best = Some(gain);
             }
@@ -413,7 +426,8 @@ impl Search<'_, '_> {
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
-        let rest = |s: &Scored| others.iter().any(|other| other.shares_edge(&s.candidate));
+        // And of one joint's dry friction there is one level.
+        let rest = |s: &Scored| others.iter().any(|other| other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
@@ -591,11 +605,32 @@ fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
     (place(one) == place(other)).then_some(share)
 }
 
+/// Share of an effect by which a loop has to differ from a straight line: the load that is believed is off by as much.
+const OFF_THE_LINE: f64 = 0.1;
+/// Share of its score that a straight line may then be behind.
+const ON_THE_LINE: f64 = 0.3;
+
+/// Is a loop that the best claim says, up to what the load is known by, the straight line that the other one says?
+fn is_straight(best: &Scored, line: &Scored) -> bool {
+    let physics = |scored: &Scored| scored.candidate.family.physics;
+    if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.window != line.candidate.window {
+        return false;
+    }
+    let effect = |scored: &Scored, cell: usize| scored.candidate.effect(cell, &scored.coefficients);
+    line.candidate.columns.iter().flat_map(|column| &column.parts).all(|(cell, _)| {
+        let (loops, straight) = (effect(best, *cell), effect(line, *cell));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let overlap = dot(&loops, &straight).powi(2) / (dot(&loops, &loops) * dot(&straight, &straight)).max(1e-300);
+        loops.len() == straight.len() && overlap > 1.0 - OFF_THE_LINE * OFF_THE_LINE
+    })
+}
+
 /// Brings the simplest of those that are as good as the best to the front.
 fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
     let Some(best) = claims.first() else { return };
     let good = |best: &Scored, claim: &Scored| {
-        let share = held(&best.candidate, &claim.candidate, last_link).unwrap_or(equal);
+        let held = held(&best.candidate, &claim.candidate, last_link);
+        let share = if held.is_some() && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
         claim.score >= best.score - (share * best.score.abs()).max(3.0)
     };
     let simplest = (0..claims.len())

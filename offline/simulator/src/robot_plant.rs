@@ -6,12 +6,15 @@ use arm::{JOINTS, Motors, Raven2, Side};
 use crate::model::{Bound, Effect, Robot};
 use crate::physics::{LinkGeometry, Physics};
 use crate::plant::{
-    Between, CableLaw, Drive, DriveNumbers, JOINTS_MAX, Method, Passive, Plant, PlantError, Rubbing, Stiction, Timed,
+    Between, CableLaw, Drive, DriveNumbers, Held, JOINTS_MAX, Method, Passive, Plant, PlantError, Rubbing, Stiction, Timed,
 };
 use crate::tool_axes::{FIRST, ToolAxes};
 
 /// Capstan torque under which a motor warms up by one unit: about the RMS torque of teleoperation, N·m **(assumed)**.
 const TORQUE_REF_NM: [f64; JOINTS] = [0.15, 0.15, 0.1, 0.03, 0.03, 0.03, 0.03];
+
+/// The joint along which the tool cables run.
+const INSERTION: usize = 2;
 
 /// Rate times step up to which the explicit method is used: it is stable to 2.78, and the mass matrix changes with posture.
 pub(crate) const EXPLICIT_MAX: f64 = 2.0;
@@ -38,6 +41,10 @@ pub(crate) fn build(robot: &Robot, side: Side, homing_offset: &Motors) -> Result
             let slot = plant.memory()?;
             plant.drive_mut(joint).stiction = Some(Stiction { presliding, slot });
         }
+    }
+    if let Some(dragged) = robot.tool_cables {
+        let (strain, faded) = (plant.memory()?, plant.memory()?);
+        plant.drive_mut(INSERTION).dragged = Some(Held { dragged, strain, faded });
     }
     for effect in &robot.effects {
         add(&mut plant, &mut tool, effect)?;

@@ -1,6 +1,6 @@
 //! Motors: torque scale, offset and ripple.
 
-use super::dictionary::Dictionary;
+use super::dictionary::{Dictionary, size};
 use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 
@@ -17,10 +17,19 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     for j in 0..dictionary.joints() {
         let offset = move |d: &Dictionary| d.effort_of(j, vec![1.0; d.grid.len()], false);
         let bound = Bound::Between(-0.95, 5.0);
-        all.push(Family::fixed("motor_torque_scale", &[j], "scale", TORQUE, &[bound], move |d| vec![total(d, j)]));
+        all.push(Family::fixed("motor_torque_scale", &[j], "scale", TORQUE, &[bound], move |d| {
+            vec![total(d, j, &super::friction::steep(d, j))]
+        }));
+        // The friction in it turns as that of the robot does.
+        let usual = size(&dictionary.at_grid(|r, i, _| dictionary.problem.pairs[r].real.drive_velocity[j][i])).max(1e-9);
+        let speeds = product(&[&super::friction::SIGN_SPEED.map(|share| share * usual)]);
+        let rounded = move |d: &Dictionary, s: &[f64]| vec![total(d, j, &super::friction::turning(d, j, s[0]))];
+        let family =
+            Family::shaped("motor_torque_scale", &[j], "scale, rounded", TORQUE, &[bound], &[("v_eps", true)], speeds, rounded);
+        all.push(family.penalised(0.5));
         all.push(
             Family::fixed("motor_torque_scale", &[j], "scale and offset", TORQUE, &[bound, Bound::Free], move |d| {
-                vec![total(d, j), offset(d)]
+                vec![total(d, j, &super::friction::steep(d, j)), offset(d)]
             })
             .penalised(1.5),
         );
@@ -63,10 +72,9 @@ fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64>
 }
 
 /// All that the motor gives: load, rotor, nominal friction.
-fn total(dictionary: &Dictionary, j: usize) -> Column {
+fn total(dictionary: &Dictionary, j: usize, sign: &[f64]) -> Column {
     let problem = dictionary.problem;
     let coulomb = problem.nominal.drives[j][2];
-    let sign = super::friction::steep(dictionary, j);
-    let load = dictionary.at_grid(|r, _, k| problem.loads[r][k].motor[j]);
-    dictionary.effort_of(j, load.iter().zip(&sign).map(|(load, s)| load + coulomb * s).collect(), false)
+    let load = dictionary.drive_torque(j);
+    dictionary.effort_of(j, load.iter().zip(sign).map(|(load, s)| load + coulomb * s).collect(), false)
 }

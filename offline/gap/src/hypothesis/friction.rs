@@ -11,7 +11,7 @@ const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
 type Turn = fn(&Dictionary, usize, (usize, bool), &[f64]) -> Vec<f64>;
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
-const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
+pub(super) const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 /// Least Stribeck speed over the RMS speed: a narrower curve is a spike at a standstill, whose height nothing tells.
 const STRIBECK_LEAST: f64 = 0.01;
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
@@ -151,10 +151,15 @@ fn by_speed(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), sh
     dictionary.problem.pairs[run].real.quick(j, at_link).iter().map(|v| (v / shape[0]).tanh()).collect()
 }
 
-/// Sign of the velocity as steep as its noise allows, smoothed.
+/// Sign of a drive's velocity, turning over a speed, smoothed.
+pub(super) fn turning(dictionary: &Dictionary, j: usize, speed: f64) -> Vec<f64> {
+    smooth(dictionary, (j, false), &[speed], by_speed)
+}
+
+/// The same, as steep as its noise allows.
 pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     let speed = dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max);
-    smooth(dictionary, (j, false), &[speed], by_speed)
+    turning(dictionary, j, speed)
 }
 
 /// What the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, and that of the sign.

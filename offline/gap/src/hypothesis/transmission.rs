@@ -35,10 +35,12 @@ pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness"
 const HOMED: f64 = 2.0;
 /// Time constants of creep, s.
 const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
+/// How many of the time constants are tried where it was under way: of the longer ones the start is but an offset.
+const UNDER_WAY: usize = 6;
 /// Over so many time constants its load is averaged where its past is not known.
 const AVERAGED: f64 = 2.0;
-/// Times its load to which a cable may have crept at the start: it may have held more.
-const STARTED: f64 = 5.0;
+/// Times its usual load to which a cable may have crept at the start.
+const STARTED: f64 = 2.0;
 /// Periods of an eccentric pulley, from and to as shares of the travel, and how many. Where the recording shows a small part of what the
 /// joint can do they go on to that: a pulley is as large as the joint needs it.
 const PERIODS: (f64, f64, usize) = (0.03, 2.5, 36);
@@ -219,16 +221,21 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &bounds, &[("T_k", true)], times.clone(), columns);
         all.push(family.penalised(1.0));
     }
-    // Where it has crept a part of the way: what the load at the start had still to do dies away.
-    let columns = move |d: &Dictionary, s: &[f64]| {
-        let (fresh, settled) = (crept(d, j, s[0], 0.0), crept(d, j, s[0], 1.0));
-        let start = settled.iter().zip(&fresh).map(|(settled, fresh)| settled - fresh).collect();
-        vec![d.strain_of(j, fresh), d.strain_of(j, start)]
-    };
+    // Where it has crept before: that dies away.
+    let columns =
+        move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], 0.0)), d.strain_of(j, left_of_before(d, j, s[0]))];
     let bounds = [Bound::Positive, Bound::Within(STARTED)];
-    let family =
-        Family::shaped("cable_creep", &[j], "under way at the start", TRANSMISSION, &bounds, &[("T_k", true)], times, columns);
-    all.push(family.penalised(2.0));
+    let family = Family::shaped(
+        "cable_creep",
+        &[j],
+        "under way at the start",
+        TRANSMISSION,
+        &bounds,
+        &[("T_k", true)],
+        product(&[&CREEP_S[..UNDER_WAY]]),
+        columns,
+    );
+    all.push(family.penalised(4.0));
     all.push(
         Family::shaped(
             "thermal_drift",
@@ -247,9 +254,11 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
 /// Load behind a first-order lag, which at the start of a run is where it stood so long that it settled to this share of its load. Of the
 /// rest of a run, whose beginning is not there, the load was what it is now on the average.
 fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f64> {
-    // Faster creep is stretch.
-    let time_s = time_s.max(0.5 * CREEP_S[0]);
     let load = dictionary.cable_load(j);
+    // Faster creep is stretch, and no claim of its own.
+    if time_s < 0.6 * CREEP_S[0] {
+        return vec![0.0; load.len()];
+    }
     let mut out: Vec<f64> = Vec::with_capacity(load.len());
     for (row, &(r, i, k)) in dictionary.grid.iter().enumerate() {
         let motion = &dictionary.problem.pairs[r].real;
@@ -269,6 +278,15 @@ fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f6
         out.push(state);
     }
     out
+}
+
+/// What is left of a load like the usual one that a cable bore before the start of a run; nothing in the rest of a run.
+fn left_of_before(dictionary: &Dictionary, j: usize, time_s: f64) -> Vec<f64> {
+    let usual = size(&dictionary.cable_load(j));
+    dictionary.at_grid(|r, i, _| {
+        let run = &dictionary.problem.pairs[r].real.run;
+        if run.since_s > 0.0 { 0.0 } else { usual * (-run.elapsed_s(i) / time_s).exp() }
+    })
 }
 
 /// Seconds between rows.

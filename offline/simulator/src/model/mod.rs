@@ -17,6 +17,12 @@
 //! [stiction]                  # joint friction that holds at rest: travel over which it turns, rad, rad, m
 //! presliding = [1e-4, 1e-4, 2e-5]
 //!
+//! [tool_cables]               # what motor 3 drags along, at its capstan (plant::Dragged)
+//! stiffness_nm_rad = 0.02
+//! level_nm = 0.07
+//! v_s_rad_s = 4.0
+//! memory_s = 0.05
+//!
 //! [[effect]]
 //! physics = "backlash"        # a name of models/gap-vocabulary.json
 //! joint = 3

@@ -5,7 +5,7 @@ use arm::{JOINTS, RIGID_JOINTS, Raven2, Side};
 use super::drive_model::{Connection, DriveModel};
 use super::effect::Names;
 use super::{ControllerModel, ControllerNumbers, Effect, RobotError, RobotModel};
-use crate::plant::DriveNumbers;
+use crate::plant::{Dragged, DriveNumbers};
 
 /// A RAVEN-II robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Robot {
     /// Joint friction of joints 1 to 3 that holds at rest, with the travel over which it turns, rad, rad, m; none: the smoothed
     /// sign of the plant file, which creeps.
     pub presliding: Option<[f64; 3]>,
+    /// Tool cables that motor 3 drags along; none: they follow it freely.
+    pub tool_cables: Option<Dragged>,
     /// Standard deviation of the offset that each homing leaves, rad and m.
     pub homing_offset_sd: [f64; JOINTS],
     /// Named physics on top.
@@ -71,6 +73,7 @@ impl Robot {
             changes: toml::Table::new(),
             cables: None,
             presliding: None,
+            tool_cables: None,
             homing_offset_sd: [0.0; JOINTS],
             effects: Vec::new(),
         }

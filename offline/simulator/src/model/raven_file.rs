@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 use super::error::{line_of, syntax};
 use super::tables::{EffectTable, SiteTable, effects, not_negative, positive, sites, value};
 use super::{PayloadSite, Pretension, Robot, RobotError, raven};
+use crate::plant::Dragged;
 
 const NOMINAL: &str = include_str!("../../../../models/raven2-plant.toml");
 
@@ -24,6 +25,7 @@ struct RobotFile {
     cable: Option<Spanned<CableTable>>,
     homing: Option<Spanned<HomingTable>>,
     stiction: Option<Spanned<StictionTable>>,
+    tool_cables: Option<Spanned<ToolCablesTable>>,
     #[serde(default, rename = "columns")]
     _columns: toml::Table,
     #[serde(default, rename = "model_error")]
@@ -54,6 +56,15 @@ struct StictionTable {
     presliding: [f64; 3],
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToolCablesTable {
+    stiffness_nm_rad: f64,
+    level_nm: f64,
+    v_s_rad_s: f64,
+    memory_s: f64,
+}
+
 /// A plant file: the nominal robot with the numbers that differ.
 pub(super) fn plant(text: &str) -> Result<Robot, RobotError> {
     let name = Raven2::from_toml(text)?.plant().name.clone();
@@ -82,6 +93,18 @@ pub(super) fn robot(text: &str) -> Result<(Robot, Vec<PayloadSite>), RobotError>
         let presliding = stiction.get_ref().presliding;
         require(positive(&presliding), &stiction, text, "stiction.presliding", "must hold numbers above 0, rad, rad and m")?;
         robot.presliding = Some(presliding);
+    }
+    if let Some(table) = file.tool_cables {
+        let ToolCablesTable { stiffness_nm_rad, level_nm, v_s_rad_s, memory_s } = *table.get_ref();
+        let numbers = [stiffness_nm_rad, level_nm, v_s_rad_s, memory_s];
+        require(
+            positive(&numbers),
+            &table,
+            text,
+            "tool_cables",
+            "must hold numbers above 0, N m/rad, N m, rad/s and s at motor 3",
+        )?;
+        robot.tool_cables = Some(Dragged { stiffness_nm_rad, level_nm, v_s_rad_s, memory_s });
     }
     let names = raven::names();
     robot.effects = effects(&file.effects, &names, text)?;

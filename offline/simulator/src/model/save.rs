@@ -61,6 +61,11 @@ fn raven(out: &mut String, robot: &Robot) {
     if let Some(presliding) = &robot.presliding {
         let _ = writeln!(out, "\n[stiction]\npresliding = {}", array(presliding));
     }
+    if let Some(dragged) = &robot.tool_cables {
+        let _ =
+            writeln!(out, "\n[tool_cables]\nstiffness_nm_rad = {:?}\nlevel_nm = {:?}", dragged.stiffness_nm_rad, dragged.level_nm);
+        let _ = writeln!(out, "v_s_rad_s = {:?}\nmemory_s = {:?}", dragged.v_s_rad_s, dragged.memory_s);
+    }
 }
 
 fn urdf(out: &mut String, robot: &UrdfRobot) {

@@ -6,6 +6,7 @@ use crate::physics::{
 };
 
 use super::DriveNumbers;
+use super::dragged::Held;
 use super::rub::Rub;
 
 /// An effect and the time in which it acts.
@@ -58,6 +59,8 @@ pub(crate) struct Drive {
     pub(crate) offset: f64,
     /// Joint friction that holds at rest.
     pub(crate) stiction: Option<Stiction>,
+    /// What the motor drags along.
+    pub(crate) dragged: Option<Held>,
 }
 
 /// Friction whose sign is a memory instead of a function of the speed (Dahl 1968): a joint that stands keeps it, so it does
@@ -125,6 +128,7 @@ impl Drive {
             eccentricity: Vec::new(),
             offset: 0.0,
             stiction: None,
+            dragged: None,
         }
     }
 

@@ -145,7 +145,9 @@ impl Plant {
                 (out.motor[i], out.motor_slope[i]) = (0.0, 0.0);
             } else {
                 let (motor_friction, motor_slope) = drive.motor_friction(state.speeds[i], warm);
-                out.motor[i] = applied_nm[i] - motor_friction - nominal.gear / nominal.ratio * reaction[i];
+                out.motor[i] =
+                    applied_nm[i] - motor_friction - drive.drag(&state.memories) - nominal.gear / nominal.ratio * reaction[i];
+                drive.drag_rates(state.speeds[i], &state.memories, &mut out.memory_rates);
                 if !drive.ripple.is_empty() {
                     out.motor[i] += drive.ripple(state.motors[i]);
                 }

@@ -85,6 +85,9 @@ impl Plant {
             Given::Joints => self.motors_of(motion, &deflection),
         };
         needed.motors = motors[0];
+        for (drive, speed) in self.drives.iter().zip(&motors[1]) {
+            drive.drag_on(*speed, step_s, &mut memory.memories);
+        }
         self.torques(&mut needed, &motors, &slope, memory);
         self.remember(&needed, &rates, memory, step_s);
         needed
@@ -191,7 +194,8 @@ impl Plant {
             let drive = &self.drives[i];
             let nominal = &drive.nominal;
             let (friction, _) = drive.motor_friction(motors[1][i], drive.warm_share(&memory.memories));
-            let acts = nominal.inertia * motors[2][i] + friction + nominal.gear / nominal.ratio * reaction[i];
+            let held = friction + drive.drag(&memory.memories);
+            let acts = nominal.inertia * motors[2][i] + held + nominal.gear / nominal.ratio * reaction[i];
             needed.torque[i] = drive.commanded(acts - drive.ripple(motors[0][i]));
         }
     }

@@ -6,6 +6,7 @@
 //! A rigid drive has no deflection: its motor is part of the link (`rigid.rs`).
 
 mod cable;
+mod dragged;
 mod drive;
 mod evaluate;
 mod inverse;
@@ -21,6 +22,8 @@ use arm::serial::{SerialArm, Workspace};
 use nalgebra::Vector3;
 
 pub use cable::{CableForce, CableLaw};
+pub use dragged::Dragged;
+pub(crate) use dragged::Held;
 pub(crate) use drive::{Drive, Stiction, Timed, on};
 pub use inverse::{Given, Memory, Needed};
 pub use numbers::{Between, DriveNumbers, Passive, Rubbing};

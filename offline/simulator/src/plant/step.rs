@@ -31,6 +31,7 @@ impl Plant {
                 Method::Rk4 => self.rk4(state, &applied, step_s),
                 Method::Rosenbrock => self.rosenbrock(state, &applied, step_s),
             }
+            self.drives.iter().for_each(|drive| drive.slip(&mut state.memories));
         }
         self.follow(state);
     }
