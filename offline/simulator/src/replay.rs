@@ -87,8 +87,8 @@ impl Replay {
         Ok(Self { plant, arm: robot.raven.arm(side) })
     }
 
-    /// Motor angles, rad, one row per row of the record, from the measured state at its beginning: motors as recorded, cables wound up as
-    /// far as the command in the first row says.
+    /// Motor angles, rad, one row per row of the record, from the measured state at its beginning: motors as recorded, joints
+    /// where gravity and the motors' speeds put them; what a motor drags along is wound up as far as the command in the first row says.
     pub fn free_run(&mut self, record: &MotorRecord) -> Vec<[f64; FIRST]> {
         let mut state = self.start(record);
         let mut angles = Vec::with_capacity(record.len());
@@ -108,12 +108,13 @@ impl Replay {
         let mut state = State::ZERO;
         if let (Some(angles), Some(speeds), Some(dac)) = (record.angles.first(), record.speeds.first(), record.dac.first()) {
             motors[..FIRST].copy_from_slice(angles);
-            let (mut turning, mut torque) = ([0.0; JOINTS_MAX], [0.0; JOINTS_MAX]);
-            turning[..FIRST].copy_from_slice(speeds);
-            for i in 0..FIRST {
-                torque[i] = self.arm.amplifiers.torque(i, dac[i]);
-            }
-            state = self.plant.under_way(&motors, &turning, &torque);
+            state = self.plant.at_rest(&motors);
+            let mut all = [0.0; JOINTS];
+            all[..FIRST].copy_from_slice(speeds);
+            state.speeds[..FIRST].copy_from_slice(speeds);
+            state.rates[..FIRST].copy_from_slice(&self.arm.transmission.joints(&all)[..FIRST]);
+            self.plant
+                .wind_up(&mut state, &std::array::from_fn(|i| if i < FIRST { self.arm.amplifiers.torque(i, dac[i]) } else { 0.0 }));
         }
         state
     }

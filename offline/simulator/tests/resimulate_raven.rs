@@ -7,7 +7,7 @@ use arm::{JOINTS, Side};
 use common::data;
 use recordings::csv;
 use simulator::model::RobotModel;
-use simulator::plant::{Given, Vector};
+use simulator::plant::{Dragged, Given, Vector};
 use simulator::replay::{MotorRecord, Replay};
 use simulator::resimulate::{ClosedLoop, Motion, OpenLoop, Run, closed_loop, inverse, open_loop};
 use simulator::trajectory::{WORKSPACE, teleoperation};
@@ -56,8 +56,17 @@ fn the_commands_of_a_simulated_run_give_that_run() {
 
 #[test]
 fn the_torque_that_a_motion_needs_is_the_one_that_was_commanded() {
-    let (cycles, run) = made(&Robot::nominal(), Side::Gold);
-    let model = RobotModel::raven(Robot::nominal(), Side::Gold);
+    let dragged = Dragged { stiffness_nm_rad: 0.02, level_nm: 0.06, v_s_rad_s: 4.0, memory_s: 0.05 };
+    let mut robot = Robot::nominal();
+    for tool_cables in [None, Some(dragged)] {
+        robot.tool_cables = tool_cables;
+        needs_what_was_commanded(&robot);
+    }
+}
+
+fn needs_what_was_commanded(robot: &Robot) {
+    let (cycles, run) = made(robot, Side::Gold);
+    let model = RobotModel::raven(robot.clone(), Side::Gold);
     let motion = Motion::of_run(&run, Given::Motors, 6).expect("motion");
     let found = inverse(&model, &motion).expect("inverse");
     for joint in 0..3 {

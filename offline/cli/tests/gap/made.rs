@@ -1,6 +1,6 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
-use crate::common::{Case, Folder, done, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
+use crate::common::{Case, Folder, done, holds, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
 use gap_report::{Channel, Report, Status};
 use generator::order::{Kind, Order, Wanted};
 use generator::trajectory::Excitation;
@@ -37,6 +37,33 @@ fn dry_friction_behind_the_elbows_cable_is_no_play() {
     let report = Case { robot: PathBuf::from("raven2-nominal"), real: vec![run], sim: Vec::new() }.judged(&folder.file("out"));
     let first = named(&report, "coulomb_friction", "elbow");
     near(first, "f_c", 0.8, 0.05);
+}
+
+#[test]
+fn one_effect_of_a_raven_is_told_without_a_simulation() {
+    // Its cables pass other joints, its friction loads them, and its encoders come a millisecond late.
+    let cases = [
+        ("physics = \"cable_stretch\"\njoint = 1\nparameters = { k = 2000.0 }", "cable_stretch", "shoulder", "k", 2000.0, 0.1),
+        ("physics = \"cable_stretch\"\njoint = 3\nparameters = { k = 8000.0 }", "cable_stretch", "insertion", "k", 8000.0, 0.1),
+        ("physics = \"backlash\"\njoint = 2\nparameters = { b = 0.01 }", "backlash", "elbow", "b", 0.01, 0.2),
+        (
+            "physics = \"motor_torque_scale\"\njoint = 2\nparameters = { kappa = 0.7, d_0 = 0.0 }",
+            "motor_torque_scale",
+            "elbow",
+            "kappa",
+            0.7,
+            0.05,
+        ),
+    ];
+    for (k, (effect, physics, joint, name, size, share)) in cases.into_iter().enumerate() {
+        let folder = Folder::new(&format!("one-effect-{k}"));
+        let robot = folder.write("robot.toml", with_effect(effect));
+        let run = folder.run("0.5", Some(&robot), &[]);
+        let report = Case { robot: PathBuf::from("raven2-nominal"), real: vec![run], sim: Vec::new() }.judged(&folder.file("out"));
+        let first = named(&report, physics, joint);
+        assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+        holds(first, name, size, share);
+    }
 }
 
 #[test]

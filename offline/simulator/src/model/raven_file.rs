@@ -219,6 +219,17 @@ mod tests {
     }
 
     #[test]
+    fn tool_cables_are_read_written_and_refused_without_a_size() {
+        let rest = "[tool_cables]\nstiffness_nm_rad = 0.02\nlevel_nm = 0.06\nv_s_rad_s = 4.0\nmemory_s = 0.05\n";
+        let robot = Robot::from_toml(&format!("{HEAD}{rest}")).expect("robot");
+        assert_eq!(robot.tool_cables, Some(Dragged { stiffness_nm_rad: 0.02, level_nm: 0.06, v_s_rad_s: 4.0, memory_s: 0.05 }));
+        let saved = crate::RobotModel::raven(robot.clone(), arm::Side::Gold).to_toml();
+        assert_eq!(Robot::from_toml(&saved).expect("saved"), robot);
+        assert!(refused(&rest.replace("0.06", "0.0")).contains("tool_cables"));
+        assert!(refused("[tool_cables]\nlevel_nm = 0.06\n").contains("missing field"));
+    }
+
+    #[test]
     fn effects_have_their_place_and_their_time() {
         let rest = "[[effect]]\nphysics = \"payload\"\nfrom_s = 5.5\nparameters = { m_p = 0.25, c_z = -0.4 }\n\
                     [[effect]]\nphysics = \"joint_coupling\"\njoint = 2\ndriven_by = 1\nparameters = { c_ij = 0.02 }\n";

@@ -62,48 +62,36 @@ impl Plant {
         state
     }
 
-    /// A state in which motors at given angles, rad, turn at given speeds, rad/s, under capstan torques, N·m: what a motor's torque exceeds its
-    /// own friction by winds up its cable, as far as the friction of its joint holds that, and what it drags along, in the share of the two.
-    /// Where a motor stands, its friction may hold anything, and the least is taken.
-    pub fn under_way(&mut self, motors: &Vector, speeds: &Vector, torque_nm: &Vector) -> State {
+    /// Winds up what a turning motor drags along, and its cable beside it, at a state whose history is not known, under capstan torques, N·m: what
+    /// the torque exceeds the motor's own friction and the cable's load by, as far as friction behind both holds it, in the share of the two.
+    /// Where a motor stands, its friction may hold anything, and the least is taken. Other motors stay as they are.
+    pub fn wind_up(&mut self, state: &mut State, torque_nm: &Vector) {
         let applied = self.applied(torque_nm);
-        let mut state = self.at_rest(motors);
         let n = self.joints;
-        state.speeds = *speeds;
-        let over = |i: usize| speeds[i] / self.drives[i].nominal.ratio;
-        state.rates =
-            std::array::from_fn(|i| if i < n { (0..n).map(|k| self.coupling_inverse[i][k] * over(k)).sum() } else { 0.0 });
-        let found = self.deflections(&state);
+        let found = self.deflections(state);
         let mut wound = [0.0; super::JOINTS_MAX];
         for i in 0..n {
             let drive = &self.drives[i];
+            let Some(held) = drive.dragged else { continue };
             let nominal = &drive.nominal;
-            if nominal.between == Between::Rigid {
-                continue;
-            }
-            let cable = drive.elastic(found.position[i], 0.0, &state.memories);
             let per_joint = nominal.gear / nominal.ratio;
+            let cable = drive.elastic(found.position[i], 0.0, &state.memories);
             let free = applied[i] - per_joint * cable.torque;
-            let (rubs, _) = drive.motor_friction(speeds[i], 1.0);
-            let turns = speeds[i].abs() > nominal.motor.width;
-            let most = nominal.motor.coulomb;
-            let excess = if turns { free - rubs } else { free - free.clamp(-most, most) };
-            let joint = (per_joint * drive.joint_friction(nominal.joint.width * 5.0, 1.0, &state.memories).torque).abs();
-            let mut dragged = 0.0;
-            if let Some(held) = drive.dragged {
-                state.memories[held.faded] = held.dragged.fades(speeds[i]);
-                dragged = held.dragged.level(state.memories[held.faded]);
-            }
-            let excess = excess.clamp(-joint - dragged, joint + dragged);
-            let share = excess / (joint + dragged).max(1e-12);
-            if let Some(held) = drive.dragged {
-                state.memories[held.strain] = share * dragged / held.dragged.stiffness_nm_rad;
-            }
+            let speed = state.speeds[i];
+            let excess = if speed.abs() > nominal.motor.width {
+                free - drive.motor_friction(speed, 1.0).0
+            } else {
+                free - free.clamp(-nominal.motor.coulomb, nominal.motor.coulomb)
+            };
+            let joint = (per_joint * nominal.joint.coulomb).abs();
+            state.memories[held.faded] = held.dragged.fades(speed);
+            let level = held.dragged.level(state.memories[held.faded]);
+            let share = (excess / (joint + level).max(1e-12)).clamp(-1.0, 1.0);
+            state.memories[held.strain] = share * level / held.dragged.stiffness_nm_rad;
             wound[i] = share * joint / per_joint / cable.stiffness.max(1e-9);
         }
         for i in 0..n {
             state.joints[i] -= (0..n).map(|k| self.coupling_inverse[i][k] * wound[k]).sum::<f64>();
         }
-        state
     }
 }

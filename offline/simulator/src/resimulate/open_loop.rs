@@ -26,7 +26,7 @@ impl Default for OpenLoop {
 }
 
 /// The run of a robot whose motors are driven by the recorded torque. Each window starts with motors and speeds as recorded
-/// and the joints where weight puts them; what cables and friction remember is kept. Without motors it starts at rest at 0.
+/// and the joints where weight puts them; what cables and friction remember is kept, but for what is wound up ([`Plant::wind_up`]). Without motors it starts at rest at 0.
 ///
 /// # Errors
 /// [`ResimulateError`] without torque, and for effects that cannot be where they are.
@@ -84,6 +84,10 @@ fn start(plant: &mut Plant, sensors: &Sensors, run: &Run, row: usize, before: &S
     let n = plant.joints();
     state.speeds[..n].copy_from_slice(&speeds[..n]);
     state.rates = sensors.joints_of(&speeds, false);
+    if let Some(torque) = &run.torque {
+        let gears = gears(plant);
+        plant.wind_up(&mut state, &std::array::from_fn(|i| if i < n { gears[i] * torque[row][i] } else { 0.0 }));
+    }
     plant.follow(&mut state);
     state
 }
