@@ -300,8 +300,8 @@ impl Nominal {
                 self.late_s[j] = learnt.1[2];
                 least = learnt.0;
             }
-            if own.0 < least && own.1[0] > 0.0 {
-                let [viscous, dry, width] = robot.drives[j].behind;
+            let [viscous, dry, width] = robot.drives[j].behind;
+            if viscous + dry > 0.0 && own.0 < least && own.1[0] > 0.0 {
                 compliance[j][0] = own.1[0];
                 (self.link_friction[j], self.link_sign_width[j]) = ([viscous, dry], Some(width));
                 self.late_s[j] = own.1[1];

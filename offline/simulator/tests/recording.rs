@@ -65,8 +65,8 @@ fn on_the_third_that_it_was_not_fitted_to_the_fit_leaves_half_of_standing_still_
     println!("last third, 1 s windows, rad RMS: origin {origin:.2?}, fitted {found:.2?}, standing still {still:.2?}");
     for motor in 0..3 {
         assert!(found[motor] < origin[motor], "motor {}: {}", motor + 1, found[motor]);
-        // Half is asked for; motor 3 stays short of it.
-        let most = [0.5, 0.5, 0.8][motor];
+        // Half is asked for; motor 3 stays a little short of it.
+        let most = [0.5, 0.5, 0.6][motor];
         assert!(found[motor] < most * still[motor], "motor {}: {} of {}", motor + 1, found[motor], still[motor]);
     }
 }
@@ -82,6 +82,7 @@ fn longer_free_runs_of_the_nominal_plant_stay_closer_than_the_origins_simulator(
         for motor in 0..3 {
             // The origin's free run over the whole recording (issue 3). The fitted set was fitted over one second at a time and a little
             // over five: over fourteen its motor 1 drifts away, as an open loop under gravity may.
+            assert!(window > 5000 || fitted[motor] < 0.4 * still[motor], "motor {}: {}", motor + 1, fitted[motor]);
             let origin = [98.0, 394.0, 129.0][motor];
             assert!(nominal[motor] < origin / 3.0, "motor {}: {}", motor + 1, nominal[motor]);
             assert!(window > 5000 || fitted[motor] < still[motor], "motor {}: {}", motor + 1, fitted[motor]);
