@@ -237,7 +237,7 @@ fn analyse_with(
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
     let begun = Instant::now();
-    let robot = Robot::of(model);
+    let robot = Robot { simulates_itself: given.iter().all(|one| one.sim.is_none()), ..Robot::of(model) };
     progress("reading the runs");
     let mut runs = Vec::new();
     // Simulations that move otherwise, or at another time, than the recording.

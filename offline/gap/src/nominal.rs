@@ -286,6 +286,9 @@ impl Nominal {
                 compliance[j][0] = slope;
                 (self.link_friction[j], self.link_sign_width[j]) = (friction, None);
             }
+            if !robot.simulates_itself {
+                continue;
+            }
             // The robot's own numbers, or dry friction alone, where they say more: a sensor that comes late adds a share of the velocity, which
             // passes for viscous friction, mostly of the wrong sign.
             let [viscous, dry] = self.link_friction[j];

@@ -75,6 +75,8 @@ pub struct Robot {
     pub payload_sites: Vec<PayloadSite>,
     /// Physics and joints of the effects that its model holds already: of those there may be less, too.
     pub known: Vec<(String, Vec<usize>)>,
+    /// Is it simulated by its own numbers? A lab's simulation may have other friction behind its cables, and begins where the recording does.
+    pub simulates_itself: bool,
     /// Of a RAVEN-II the kinematics of all seven joints: its tip goes with the wrist, too.
     pub with_wrist: Option<Kinematics>,
 }
@@ -123,6 +125,7 @@ impl Robot {
             payload_sites: sites.collect(),
             known: crate::known::effects(model),
             with_wrist: model.as_raven().map(|robot| robot.raven.arm(model.side()).kinematics.clone()),
+            simulates_itself: false,
             motor_from_joint,
             arm,
         }

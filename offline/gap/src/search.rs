@@ -8,6 +8,7 @@ use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME,
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
+use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -451,7 +452,7 @@ impl Search<'_, '_> {
         }
         sort(&mut claims);
         self.told_apart(others, &mut claims);
-        parsimonious(&mut claims, self.thresholds.equal, self.problem.robot.joint_count() - 1);
+        parsimonious(&mut claims, self.thresholds.equal, self.problem.robot);
         claims
     }
 
@@ -626,11 +627,13 @@ fn is_straight(best: &Scored, line: &Scored) -> bool {
 }
 
 /// Brings the simplest of those that are as good as the best to the front.
-fn parsimonious(claims: &mut [Scored], equal: f64, last_link: usize) {
+fn parsimonious(claims: &mut [Scored], equal: f64, robot: &Robot) {
+    let last_link = robot.joint_count() - 1;
     let Some(best) = claims.first() else { return };
     let good = |best: &Scored, claim: &Scored| {
         let held = held(&best.candidate, &claim.candidate, last_link);
-        let share = if held.is_some() && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
+        let share =
+            if held.is_some() && robot.simulates_itself && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
         claim.score >= best.score - (share * best.score.abs()).max(3.0)
     };
     let simplest = (0..claims.len())

@@ -221,21 +221,24 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &bounds, &[("T_k", true)], times.clone(), columns);
         all.push(family.penalised(1.0));
     }
-    // Where it has crept before: that dies away.
-    let columns =
-        move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], 0.0)), d.strain_of(j, left_of_before(d, j, s[0]))];
-    let bounds = [Bound::Positive, Bound::Within(STARTED)];
-    let family = Family::shaped(
-        "cable_creep",
-        &[j],
-        "under way at the start",
-        TRANSMISSION,
-        &bounds,
-        &[("T_k", true)],
-        product(&[&CREEP_S[..UNDER_WAY]]),
-        columns,
-    );
-    all.push(family.penalised(4.0));
+    if dictionary.problem.robot.simulates_itself {
+        // Where it has crept before: that dies away.
+        let columns = move |d: &Dictionary, s: &[f64]| {
+            vec![d.strain_of(j, crept(d, j, s[0], 0.0)), d.strain_of(j, left_of_before(d, j, s[0]))]
+        };
+        let bounds = [Bound::Positive, Bound::Within(STARTED)];
+        let family = Family::shaped(
+            "cable_creep",
+            &[j],
+            "under way at the start",
+            TRANSMISSION,
+            &bounds,
+            &[("T_k", true)],
+            product(&[&CREEP_S[..UNDER_WAY]]),
+            columns,
+        );
+        all.push(family.penalised(4.0));
+    }
     all.push(
         Family::shaped(
             "thermal_drift",
