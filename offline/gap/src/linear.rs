@@ -13,9 +13,13 @@ pub fn ridge(a: &DMatrix<f64>, b: &DVector<f64>, ridge: &[f64], prior: &DVector<
     prior + right
 }
 
+/// Sum of the products of two series.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Coefficients of the columns whose sum comes closest to a series.
 pub fn least_squares(columns: &[&[f64]], series: &[f64]) -> Vec<f64> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut gram = DMatrix::from_fn(columns.len(), columns.len(), |i, k| dot(columns[i], columns[k]));
     let mut at = DVector::from_fn(columns.len(), |i, _| dot(columns[i], series));
     solve(&mut gram, &mut at);

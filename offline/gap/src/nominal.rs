@@ -4,11 +4,11 @@ use std::borrow::Borrow;
 
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
+use simulator::physics::smooth_sign;
 
-use crate::linear::{least_squares, solve};
+use crate::linear::{dot, least_squares, solve};
 use crate::motion::{Motion, State};
 use crate::robot::Robot;
-use simulator::physics::smooth_sign;
 
 /// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
 const DRIVE_COLUMNS: usize = 4;
@@ -221,13 +221,7 @@ impl Nominal {
 
     /// Friction behind a joint's cable at a sample.
     fn rubbing(&self, run: &Motion, j: usize, i: usize) -> f64 {
-        let [viscous, dry] = self.link_friction[j];
-        if viscous == 0.0 && dry == 0.0 {
-            return 0.0;
-        }
-        let sign =
-            self.link_sign_width[j].map_or_else(|| run.sign_at_link(j, i), |width| smooth_sign(run.quick(j, true)[i], width));
-        viscous * run.velocity[j][i] + dry * sign
+        rubs(self.link_friction[j], self.link_sign_width[j], run, j, i)
     }
 
     /// Deflection `A⁻¹ m - q` of a joint under torques of the links: they load the cables, those give way, and other joints are read through
@@ -241,36 +235,43 @@ impl Nominal {
         (0..n).filter(|drive| shares[(joint, *drive)] != 0.0).map(|drive| shares[(joint, drive)] * strain(drive)).sum()
     }
 
+    /// What a compliance and the friction that was learnt leave of a strain, RMS.
+    fn left_of(&self, strain: &Strain, compliance: f64, j: usize) -> f64 {
+        // Of the robot's own friction nothing was learnt.
+        let [viscous, dry] = if self.link_sign_width[j].is_some() { [0.0; 2] } else { self.link_friction[j] };
+        let rubs = |k: usize| viscous * strain.rubbed[0][k] + dry * strain.rubbed[1][k];
+        rms((0..strain.seen.len()).map(|k| strain.seen[k] - compliance * (strain.load[k] + rubs(k))))
+    }
+
     fn learn_deflection(&mut self, robot: &Robot, runs: &[&Motion]) {
         let mut compliance = self.compliance.clone();
         let before = self.clone();
         let mut evaluator = Evaluator::new(robot, &before);
         let n = robot.joint_count();
         let (coupling, shares) = (robot.coupling(), robot.strain_shares());
-        let (mut load, mut seen) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-        let mut rubbed = vec![[Vec::new(), Vec::new()]; n];
-        let (mut with_own, mut turning) = (vec![Vec::new(); n], vec![Vec::new(); n]);
+        let mut strains = vec![Strain::default(); n];
         let own = |j: usize, run: &Motion, i: usize| {
             let [viscous, dry, width] = robot.drives[j].behind;
-            viscous * run.velocity[j][i] + dry * smooth_sign(run.quick(j, true)[i], width)
+            rubs([viscous, dry], Some(width), run, j, i)
         };
         for run in runs {
             let Some(deflection) = &run.deflection else { continue };
             for &i in &run.rows {
                 let at = evaluator.link(&run.link(i));
-                for j in 0..n {
-                    // Of the drive's cable: what loads it, and how far it gives way.
-                    load[j].push((0..n).map(|k| shares[(k, j)] * at[k]).sum::<f64>());
-                    seen[j].push((0..n).map(|k| coupling[(j, k)] * deflection[k][i]).sum::<f64>());
-                    rubbed[j][0].push(run.velocity[j][i]);
-                    rubbed[j][1].push(run.sign_at_link(j, i));
-                    turning[j].push(run.drive_velocity[j][i]);
-                    with_own[j].push((0..n).map(|k| shares[(k, j)] * (at[k] + own(k, run, i))).sum::<f64>());
+                for (j, strain) in strains.iter_mut().enumerate() {
+                    strain.load.push((0..n).map(|k| shares[(k, j)] * at[k]).sum());
+                    strain.seen.push((0..n).map(|k| coupling[(j, k)] * deflection[k][i]).sum());
+                    strain.rubbed[0].push(run.velocity[j][i]);
+                    strain.rubbed[1].push(run.sign_at_link(j, i));
+                    if robot.simulates_itself {
+                        strain.turning.push(run.drive_velocity[j][i]);
+                        strain.with_own.push((0..n).map(|k| shares[(k, j)] * (at[k] + own(k, run, i))).sum());
+                    }
                 }
             }
         }
-        for j in 0..n {
-            let (x, y) = (&load[j], &seen[j]);
+        for (j, strain) in strains.iter().enumerate() {
+            let (x, y) = (&strain.load, &strain.seen);
             if x.len() < 40 || rms(y.iter().copied()) < 1e-12 {
                 continue;
             }
@@ -282,35 +283,69 @@ impl Nominal {
             if left >= 0.8 {
                 continue;
             }
-            if let Some((slope, friction)) = with_friction(x, &rubbed[j], y) {
+            if let Some((slope, friction)) = with_friction(x, &strain.rubbed, y) {
                 compliance[j][0] = slope;
                 (self.link_friction[j], self.link_sign_width[j]) = (friction, None);
             }
-            if !robot.simulates_itself {
-                continue;
-            }
-            // The robot's own numbers, or dry friction alone, where they say more: a sensor that comes late adds a share of the velocity, which
-            // passes for viscous friction, mostly of the wrong sign.
-            let [viscous, dry] = self.link_friction[j];
-            let known = self.link_sign_width[j].is_some();
-            let rubs = |k: usize| if known { 0.0 } else { viscous * rubbed[j][0][k] + dry * rubbed[j][1][k] };
-            let mut least = rms((0..y.len()).map(|k| y[k] - compliance[j][0] * (x[k] + rubs(k))));
-            let own = fitted(&[&with_own[j], &turning[j]], y);
-            let learnt = fitted(&[x, &rubbed[j][1], &turning[j]], y);
-            if learnt.0 < LATE * least && learnt.1[0] > 0.0 && learnt.1[1] > 0.0 {
-                compliance[j][0] = learnt.1[0];
-                (self.link_friction[j], self.link_sign_width[j]) = ([0.0, learnt.1[1] / learnt.1[0]], None);
-                self.late_s[j] = learnt.1[2];
-                least = learnt.0;
-            }
-            let [viscous, dry, width] = robot.drives[j].behind;
-            if viscous + dry > 0.0 && own.0 < least && own.1[0] > 0.0 {
-                compliance[j][0] = own.1[0];
-                (self.link_friction[j], self.link_sign_width[j]) = ([viscous, dry], Some(width));
-                self.late_s[j] = own.1[1];
+            if robot.simulates_itself
+                && let Some(behind) = strain.behind(robot.drives[j].behind, self.left_of(strain, compliance[j][0], j))
+            {
+                compliance[j][0] = behind.compliance;
+                (self.link_friction[j], self.link_sign_width[j]) = (behind.friction, behind.sign_width);
+                self.late_s[j] = behind.late_s;
             }
         }
         self.compliance = compliance;
+    }
+}
+
+/// Friction behind a joint's cable at a sample: viscous and dry, whose sign turns over a speed; none: as steep as its noise allows.
+fn rubs([viscous, dry]: [f64; 2], width: Option<f64>, run: &Motion, j: usize, i: usize) -> f64 {
+    if viscous == 0.0 && dry == 0.0 {
+        return 0.0;
+    }
+    let sign = width.map_or_else(|| run.sign_at_link(j, i), |width| smooth_sign(run.quick(j, true)[i], width));
+    viscous * run.velocity[j][i] + dry * sign
+}
+
+/// A drive's cable, row by row.
+#[derive(Debug, Clone, Default)]
+struct Strain {
+    /// What the links load it by.
+    load: Vec<f64>,
+    /// The same with the robot's own friction behind the cables.
+    with_own: Vec<f64>,
+    /// How far it gives way.
+    seen: Vec<f64>,
+    /// Velocity of the joint, and its sign.
+    rubbed: [Vec<f64>; 2],
+    /// Velocity of the drive.
+    turning: Vec<f64>,
+}
+
+/// What a strain says of a cable and of what is behind it.
+struct Behind {
+    compliance: f64,
+    friction: [f64; 2],
+    sign_width: Option<f64>,
+    late_s: f64,
+}
+
+impl Strain {
+    /// The robot's own friction (viscous, dry, width), or dry friction alone, where they leave less than `least`: a sensor that comes late adds a
+    /// share of the velocity, which passes for viscous friction, mostly of the wrong sign.
+    fn behind(&self, [viscous, dry, width]: [f64; 3], mut least: f64) -> Option<Behind> {
+        let mut best = None;
+        let (left, at) = fitted(&[&self.load, &self.rubbed[1], &self.turning], &self.seen);
+        if left < LATE * least && at[0] > 0.0 && at[1] > 0.0 {
+            least = left;
+            best = Some(Behind { compliance: at[0], friction: [0.0, at[1] / at[0]], sign_width: None, late_s: at[2] });
+        }
+        let (left, at) = fitted(&[&self.with_own, &self.turning], &self.seen);
+        if viscous + dry > 0.0 && left < least && at[0] > 0.0 {
+            best = Some(Behind { compliance: at[0], friction: [viscous, dry], sign_width: Some(width), late_s: at[1] });
+        }
+        best
     }
 }
 
@@ -440,8 +475,4 @@ pub fn less_means(series: &[f64], run_of: impl Fn(usize) -> usize) -> Vec<f64> {
     let means: Vec<f64> =
         (0..runs).map(|r| mean(&(0..series.len()).filter(|k| run_of(*k) == r).map(|k| series[k]).collect::<Vec<_>>())).collect();
     series.iter().enumerate().map(|(k, y)| y - means[run_of(k)]).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -7,6 +7,7 @@
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::{DMatrix, DVector};
 
+use crate::linear::dot;
 use crate::motion::Motion;
 use crate::nominal::{range, rms, sign_series};
 use crate::problem::{Channel, Problem};
@@ -216,8 +217,4 @@ fn gram(columns: &[Vec<f64>]) -> DMatrix<f64> {
         }
     }
     gram
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

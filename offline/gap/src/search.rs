@@ -5,6 +5,7 @@ mod at_once;
 use std::sync::Arc;
 
 use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
+use crate::linear::dot;
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -37,22 +38,6 @@ impl Default for Thresholds {
 const EDGES: usize = 12;
 /// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
 const ALWAYS: [&str; 1] = ["stribeck_friction"];
-
-/// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
-fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
-    let has_level = |candidate: &Candidate| match candidate.family.physics {
-        "coulomb_friction" | "stribeck_friction" => true,
-        "load_dependent_friction" => candidate.columns.len() > 1,
-        _ => false,
-    };
-    one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
-}
-
-/// May a form be there in a part of a run only? Steps would have an edge more than they say.
-fn comes_and_goes(family: &Family) -> bool {
-    !ALWAYS.contains(&family.physics) && family.form != STEPS_IN_TIME
-}
-
 /// What a delay in a window pays more than others, nats: a little lateness passes for the last of what a motion's middle leaves.
 const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach,
@@ -575,6 +560,21 @@ impl Search<'_, '_> {
     }
 }
 
+/// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
+fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
+    let has_level = |candidate: &Candidate| match candidate.family.physics {
+        "coulomb_friction" | "stribeck_friction" => true,
+        "load_dependent_friction" => candidate.columns.len() > 1,
+        _ => false,
+    };
+    one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
+}
+
+/// May a form be there in a part of a run only? Steps would have an edge more than they say.
+fn comes_and_goes(family: &Family) -> bool {
+    !ALWAYS.contains(&family.physics) && family.form != STEPS_IN_TIME
+}
+
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
     let edges = candidate.edges().min(2);
@@ -620,7 +620,6 @@ fn is_straight(best: &Scored, line: &Scored) -> bool {
     let effect = |scored: &Scored, cell: usize| scored.candidate.effect(cell, &scored.coefficients);
     line.candidate.columns.iter().flat_map(|column| &column.parts).all(|(cell, _)| {
         let (loops, straight) = (effect(best, *cell), effect(line, *cell));
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let overlap = dot(&loops, &straight).powi(2) / (dot(&loops, &loops) * dot(&straight, &straight)).max(1e-300);
         loops.len() == straight.len() && overlap > 1.0 - OFF_THE_LINE * OFF_THE_LINE
     })
