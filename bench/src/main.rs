@@ -86,10 +86,8 @@ fn main() -> ExitCode {
             return ended(neighbours::be_a_client(ends == "holds", &settings));
         }
         // On the core where it then is.
-        ["asleep"] => {
-            println!("{}", memory::asleep());
-            return ExitCode::SUCCESS;
-        }
+        ["asleep"] => return ended(memory::asleep(false).map(|found| println!("{found}"))),
+        ["asleep", memory::SMALL_PAGES] => return ended(memory::asleep(true).map(|found| println!("{found}"))),
         _ => {
             eprintln!(
                 "usage: ravenpose-bench ci|full [--write]|soak [MINUTES]|neighbours [MINUTES [idle|clients|service]] (from the repository's top)"

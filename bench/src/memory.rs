@@ -14,8 +14,8 @@ const MUCH: usize = 4 << 20;
 const RUNS: usize = 2000;
 /// Runs of a part, then the next has its turn.
 const TURN: usize = 200;
-/// Makes glibc ask for huge pages for all that `malloc` gives, the weights among it.
-const HUGE_PAGES: (&str, &str) = ("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=1073741824");
+/// Argument of a process that is to do without huge pages.
+pub(crate) const SMALL_PAGES: &str = "small-pages";
 
 /// What happens between two runs, or just before one.
 #[derive(Clone, Copy, PartialEq)]
@@ -61,8 +61,12 @@ fn times(plan: &mut Plan, much: &[u8], before: Before, ahead: usize, runs: usize
     taken
 }
 
-/// Runs once a millisecond, as a process of its own: prints the quantiles of each shape and the huge pages in use, KiB.
-pub(crate) fn asleep() -> String {
+/// Runs once a millisecond, as a process of its own: gives the quantiles of each shape and the huge pages in use, KiB.
+pub(crate) fn asleep(small_pages: bool) -> Result<String, String> {
+    if small_pages {
+        rustix::thread::disable_transparent_huge_pages(true)
+            .map_err(|cause| format!("no way to do without huge pages: {cause}"))?;
+    }
     let mut words = Vec::new();
     let mut plans = SHAPES.map(|(_, widths)| plan(&widths));
     for plan in &mut plans {
@@ -74,7 +78,7 @@ pub(crate) fn asleep() -> String {
     drop(plans);
     let huge = rollup.lines().find_map(|line| line.strip_prefix("AnonHugePages:")?.split_whitespace().next());
     words.push(huge.unwrap_or("0").to_owned());
-    words.join(" ")
+    Ok(words.join(" "))
 }
 
 /// [`asleep`] in another process: a row for each shape, and the KiB of huge pages.
@@ -102,18 +106,18 @@ pub(crate) fn run(core: usize) -> Result<Table, String> {
     ];
     let mut table = Table::new("What caches, pages and the core bring: weights of 16 bits, us", &["p50", "p99", "p99.9", "max"]);
     let program = std::env::current_exe().map_err(|cause| cause.to_string())?;
-    let mut shielded = Command::new("bench/shield.sh");
-    shielded.arg(core.to_string()).arg(&program);
-    let mut huge = Command::new(&program);
-    huge.env(HUGE_PAGES.0, HUGE_PAGES.1);
+    let [mut own, mut small, mut shielded] = [Command::new(&program), Command::new(&program), Command::new("bench/shield.sh")];
+    own.arg("asleep");
+    small.args(["asleep", SMALL_PAGES]);
+    shielded.arg(core.to_string()).arg(&program).arg("asleep");
     let others = [
-        ("  in a process of its own", Command::new(&program)),
-        ("  and its weights on huge pages", huge),
+        ("  in a process of its own", own),
+        ("  and its weights on pages of 4 KiB", small),
         ("  and the core to itself (bench/shield.sh)", shielded),
     ];
     let much = vec![1_u8; MUCH];
     let others = others.map(|(name, mut command)| {
-        let found = elsewhere(command.arg("asleep"));
+        let found = elsewhere(&mut command);
         match &found {
             Ok((_, huge)) => println!("{}: {huge:.0} KiB on huge pages", name.trim()),
             Err(why) => println!("note: {}: not measured: {why}", name.trim()),

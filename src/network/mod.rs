@@ -8,6 +8,7 @@ mod deviation;
 mod format;
 mod instructions;
 mod pairs;
+mod region;
 mod rounding;
 mod rows;
 #[cfg(target_arch = "x86_64")]
@@ -18,9 +19,10 @@ pub use deviation::{Choice, Deviation, NotExactEnough, RANDOM_INPUTS, choose};
 pub use format::{Format, UnknownFormat};
 pub use instructions::InstructionSet;
 
-use instructions::{LANE, Lane, Line, bytes_of};
+use instructions::{LANE, Lane, bytes_of};
 use pairs::{Numbers, Pairs};
 use ravenpose_importer::{Activation, Dense, Network};
+use region::Lines;
 use rounding::{Spread, Whole};
 use rows::{Float, Rows};
 use std::sync::Arc;
@@ -124,7 +126,8 @@ impl Plan {
         };
         let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
-        let layers = network.layers.iter().enumerate().map(layer).collect();
+        let mut layers: Vec<Layer> = network.layers.iter().enumerate().map(layer).collect();
+        region::gather(layers.iter_mut().map(|layer| layer.weights.lines_mut()));
         let input_lanes = lanes(network.input_width);
         let ones = vec![1.0; network.input_width];
         let (shift, scale) = network.input_scale.as_ref().map_or_else(
@@ -136,7 +139,7 @@ impl Plan {
             output_width: network.output_width,
             shift,
             scale,
-            layers,
+            layers: layers.into(),
             front: zeros(widest),
             back: zeros(widest),
             #[cfg(target_arch = "x86_64")]
@@ -253,12 +256,21 @@ impl Weights {
         Self::Pairs(Pairs::new(whole))
     }
 
-    fn lines(&self) -> &[Line] {
+    fn lines(&self) -> &Lines {
         match self {
             Self::Rows(rows) => rows.lines(),
             Self::Pairs(pairs) => pairs.lines(),
             #[cfg(target_arch = "x86_64")]
             Self::Tiles(tiles) => tiles.lines(),
+        }
+    }
+
+    fn lines_mut(&mut self) -> &mut Lines {
+        match self {
+            Self::Rows(rows) => rows.lines_mut(),
+            Self::Pairs(pairs) => pairs.lines_mut(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Tiles(tiles) => tiles.lines_mut(),
         }
     }
 }

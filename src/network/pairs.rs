@@ -15,6 +15,7 @@ mod plain;
 use super::activation;
 use super::format::LARGEST_DIGITS;
 use super::instructions::{InstructionSet, LANE, Lane, Line};
+use super::region::Lines;
 use super::rounding::Whole;
 use ravenpose_importer::Activation;
 
@@ -54,7 +55,7 @@ impl Numbers {
 
 /// A layer's weights.
 pub(super) struct Pairs {
-    lines: Box<[Line]>,
+    lines: Lines,
     /// Groups of two inputs.
     groups: usize,
     /// Tiles side by side in the whole layer.
@@ -87,11 +88,15 @@ impl Pairs {
                 lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&number.to_le_bytes()[..bytes]);
             }
         }
-        Self { lines, groups, across: tiles, two: bytes == 2, start, scale }
+        Self { lines: lines.into(), groups, across: tiles, two: bytes == 2, start, scale }
     }
 
-    pub(super) fn lines(&self) -> &[Line] {
+    pub(super) fn lines(&self) -> &Lines {
         &self.lines
+    }
+
+    pub(super) fn lines_mut(&mut self) -> &mut Lines {
+        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`; `numbers` is room to work in.

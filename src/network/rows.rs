@@ -9,6 +9,7 @@
 use super::activation;
 use super::format::{Format, from_f16, to_bf16, to_f16};
 use super::instructions::{InstructionSet, LANE, Lane, Line, bytes_of};
+use super::region::Lines;
 use ravenpose_importer::Activation;
 
 /// Rows worked on together.
@@ -45,7 +46,7 @@ impl Float {
 
 /// A layer's weights.
 pub(super) struct Rows {
-    lines: Box<[Line]>,
+    lines: Lines,
     /// Lanes of one row.
     row_lanes: usize,
     height: usize,
@@ -73,11 +74,15 @@ impl Rows {
                 lines[at / 64].0[at % 64..at % 64 + bytes].copy_from_slice(&float.encode(*weight, row_scale)[..bytes]);
             }
         }
-        Self { lines, row_lanes, height: rows, float, scale }
+        Self { lines: lines.into(), row_lanes, height: rows, float, scale }
     }
 
-    pub(super) fn lines(&self) -> &[Line] {
+    pub(super) fn lines(&self) -> &Lines {
         &self.lines
+    }
+
+    pub(super) fn lines_mut(&mut self) -> &mut Lines {
+        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`.

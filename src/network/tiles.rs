@@ -17,6 +17,7 @@ use std::arch::x86_64::*;
 use super::activation;
 use super::format::{Format, LARGEST_DIGITS};
 use super::instructions::{InstructionSet, LANE, Lane, Line};
+use super::region::Lines;
 use super::rounding::Whole;
 use ravenpose_importer::Activation;
 
@@ -92,7 +93,7 @@ impl Digits {
 
 /// A layer's weights.
 pub(super) struct Tiles {
-    lines: Box<[Line]>,
+    lines: Lines,
     /// Groups of four inputs.
     groups: usize,
     /// Tiles side by side in the whole layer.
@@ -122,44 +123,42 @@ impl Tiles {
             panel_of.extend(std::iter::repeat_n((first, width, lines), width));
             lines += groups * lines_per_group(width, low);
         }
-        let mut packed = Self {
-            lines: vec![Line([0; 64]); lines].into_boxed_slice(),
-            groups,
-            across: tiles,
-            low,
-            start: vec![[0; LANE]; tiles].into_boxed_slice(),
-            start_mixed: vec![[0; LANE]; tiles].into_boxed_slice(),
-            scale: super::zeros(tiles),
-        };
+        let mut lines = vec![Line([0; 64]); lines].into_boxed_slice();
+        let mut start = vec![[0; LANE]; tiles].into_boxed_slice();
+        let (mut start_mixed, mut scales) = (start.clone(), super::zeros(tiles));
         for (row, (numbers, scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
             let (tile, place) = (row / LANE, row % LANE);
             // A step of the high digit is so many steps of the weights; `panel` has the rest.
-            packed.scale[tile].0[place] = (1_u32 << low) as f32 * scale;
+            scales[tile].0[place] = (1_u32 << low) as f32 * scale;
             let (panel, side_by_side, begin) = panel_of[tile];
             let in_panel = tile - panel;
             for (column, number) in numbers.iter().enumerate() {
                 let group = begin + column / DEPTH * lines_per_group(side_by_side, low);
                 let byte = place * DEPTH + column % DEPTH;
                 let (high, rest) = digits(*number, low);
-                packed.lines[group + in_panel].0[byte] = (high as i8).cast_unsigned();
-                packed.start[tile][place] -= 128 * high;
+                lines[group + in_panel].0[byte] = (high as i8).cast_unsigned();
+                start[tile][place] -= 128 * high;
                 // In the upper bits of a byte, which has a sign: times as much as makes a step of its product one of `rests`.
                 let rest = rest << (BYTE - low);
-                packed.start_mixed[tile][place] -= 128 * (high + rest);
+                start_mixed[tile][place] -= 128 * (high + rest);
                 let (rest, lows) = ((rest as i8).cast_unsigned(), group + side_by_side);
                 match low {
                     NONE => {}
                     // Of two neighbours the first has the upper half of the byte.
-                    NIBBLE => packed.lines[lows + in_panel / 2].0[byte] |= rest >> (in_panel % 2 * NIBBLE as usize),
-                    _ => packed.lines[lows + in_panel].0[byte] = rest,
+                    NIBBLE => lines[lows + in_panel / 2].0[byte] |= rest >> (in_panel % 2 * NIBBLE as usize),
+                    _ => lines[lows + in_panel].0[byte] = rest,
                 }
             }
         }
-        packed
+        Self { lines: lines.into(), groups, across: tiles, low, start, start_mixed, scale: scales }
     }
 
-    pub(super) fn lines(&self) -> &[Line] {
+    pub(super) fn lines(&self) -> &Lines {
         &self.lines
+    }
+
+    pub(super) fn lines_mut(&mut self) -> &mut Lines {
+        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`; `digits` is room to work in.
