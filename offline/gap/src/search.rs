@@ -546,11 +546,21 @@ impl Search<'_, '_> {
         ends.chain(both).collect()
     }
 
+    /// Does the first part of a candidate that has parts say what the whole says?
+    fn is_borne_out(&self, grams: &Grams, candidate: &Candidate, coefficients: &[f64]) -> bool {
+        if candidate.apart.is_empty() {
+            return true;
+        }
+        let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.apart));
+        let first = fit.coefficients[fit.coefficients.len() - candidate.apart.len()];
+        first / coefficients[0] >= BORNE_OUT
+    }
+
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
         let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
         let gain = self.scorer.gain(base, &fit);
-        within_bounds(candidate, &fit).then(|| Scored {
+        (within_bounds(candidate, &fit) && self.is_borne_out(grams, candidate, &coefficients)).then(|| Scored {
             candidate: candidate.clone(),
             gain,
             score: gain.nats - price(candidate),
@@ -559,6 +569,9 @@ impl Search<'_, '_> {
         })
     }
 }
+
+/// Share of what a whole says that its first part has to say beside the others.
+const BORNE_OUT: f64 = 0.5;
 
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {

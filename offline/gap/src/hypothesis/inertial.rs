@@ -81,6 +81,8 @@ const TORQUE: Channel = Channel::JointTorque;
 const BEYOND_THE_TIP_M: f64 = 0.25;
 /// Share of a parameter's torque that no other one gives, from which it is told apart.
 const TOLD_APART: f64 = 0.1;
+/// Share of the largest torque of a unit of any parameter below which one gives none: what is left is rounding, of right angles in a URDF too.
+const NONE_AT_ALL: f64 = 1e-4;
 /// Every parameter of a link: mass, first moments, second moments.
 const EVERY: [usize; PARAMETERS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
 
@@ -146,10 +148,12 @@ fn independent(dictionary: &Dictionary, link: usize, among: &[usize]) -> Vec<usi
     let mut a = DMatrix::from_fn(rows, PARAMETERS, |row, k| {
         regressor[row / (link + 1)][(row % (link + 1)) * n * PARAMETERS + link * PARAMETERS + k]
     });
-    let first: Vec<f64> = (0..PARAMETERS).map(|k| a.column(k).norm().max(1e-12)).collect();
+    let first: Vec<f64> = (0..PARAMETERS).map(|k| a.column(k).norm()).collect();
+    let least = NONE_AT_ALL * first.iter().copied().fold(0.0, f64::max);
     let mut chosen = Vec::new();
     loop {
-        let left = among.iter().copied().filter(|k| !chosen.contains(k)).map(|k| (k, a.column(k).norm() / first[k]));
+        let beside = among.iter().copied().filter(|k| first[*k] > least && !chosen.contains(k));
+        let left = beside.map(|k| (k, a.column(k).norm() / first[k]));
         // Of equals the first: the mass.
         let most = |best: (usize, f64), one: (usize, f64)| if one.1 > best.1 { one } else { best };
         let Some((k, _)) = left.filter(|(_, share)| *share >= TOLD_APART).reduce(most) else { break };

@@ -33,6 +33,8 @@ pub enum Bound {
     Positive,
     /// Within these.
     Between(f64, f64),
+    /// Within the last two, and of at least the first in size.
+    Sized(f64, f64, f64),
     /// Positive, and at most so many times the coefficient before.
     UpTo(f64),
     /// At most so many times the first coefficient, of either sign.
@@ -78,6 +80,8 @@ pub struct Family {
     /// Numbers of its shape that its coefficients tell.
     pub follow: Option<Arc<Follow>>,
     columns: Arc<Columns>,
+    /// Parts of its one column: of what it explains, the first has to bear it out.
+    apart: Option<Arc<Columns>>,
 }
 
 impl std::fmt::Debug for Family {
@@ -111,6 +115,7 @@ impl Family {
             carry: None,
             follow: None,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
+            apart: None,
         }
     }
 
@@ -141,6 +146,7 @@ impl Family {
             carry: None,
             follow: None,
             columns: Arc::new(columns),
+            apart: None,
         }
     }
 
@@ -187,6 +193,13 @@ impl Family {
         self
     }
 
+    /// With the parts of its one column, of which the first has to say the same as the whole.
+    #[must_use]
+    pub fn borne_out(mut self, parts: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static) -> Self {
+        self.apart = Some(Arc::new(move |dictionary, _| parts(dictionary)));
+        self
+    }
+
     /// Less likely than its rivals by so much, before any data.
     #[must_use]
     pub fn penalised(mut self, nats: f64) -> Self {
@@ -212,21 +225,25 @@ pub struct Candidate {
     pub window: Option<Window>,
     /// One per coefficient; shared, since candidates are copied where they are compared.
     pub columns: Arc<Vec<Column>>,
+    /// Parts of its one column, the first of which has to bear it out; none: nothing has to.
+    pub(crate) apart: Arc<Vec<Column>>,
 }
 
 impl Candidate {
     /// Makes the columns.
     pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], window: Option<Window>) -> Self {
-        let mut columns = (family.columns)(dictionary, shape);
-        for column in &mut columns {
-            column.silence(dictionary.problem);
-        }
-        if let Some(window) = window {
+        let made = |make: &Columns| {
+            let mut columns = make(dictionary, shape);
             for column in &mut columns {
-                *column = column.within(dictionary.problem, window);
+                column.silence(dictionary.problem);
+                if let Some(window) = window {
+                    *column = column.within(dictionary.problem, window);
+                }
             }
-        }
-        Self { family: family.clone(), shape: shape.to_vec(), window, columns: Arc::new(columns) }
+            Arc::new(columns)
+        };
+        let apart = family.apart.as_ref().map_or_else(Arc::default, |parts| made(&**parts));
+        Self { family: family.clone(), shape: shape.to_vec(), window, columns: made(&*family.columns), apart }
     }
 
     /// Numbers of its window that lie in the runs.
@@ -237,8 +254,9 @@ impl Candidate {
     /// The same within a window.
     #[must_use]
     pub fn within(&self, problem: &crate::problem::Problem, window: Window) -> Self {
-        let columns = Arc::new(self.columns.iter().map(|column| column.within(problem, window)).collect());
-        Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns }
+        let there = |columns: &[Column]| Arc::new(columns.iter().map(|column| column.within(problem, window)).collect());
+        let (columns, apart) = (there(&self.columns), there(&self.apart));
+        Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns, apart }
     }
 
     /// A number of its shape.

@@ -5,6 +5,9 @@ use super::{Bound, Column, Family};
 use crate::nominal::sign_series;
 use crate::problem::Channel;
 
+/// Least delay of a torque, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
+const LEAST_LATE_S: f64 = 5e-4;
+
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let problem = dictionary.problem;
     let bound = Bound::Between(-0.15, 0.4);
@@ -31,7 +34,12 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         }));
     }
     if problem.cell(Channel::JointTorque, 0).is_some() {
-        all.push(Family::fixed("measurement_delay", &[], "torque", Channel::JointTorque, &[bound], |d| vec![late_torque(d)]));
+        // Late is all of it. What only the sign of dry friction says is how that turns, slowly or after a moment's sticking.
+        let bound = Bound::Sized(LEAST_LATE_S, -0.15, 0.4);
+        let family = Family::fixed("measurement_delay", &[], "torque", Channel::JointTorque, &[bound], |d| {
+            vec![late_torque(d, |load, dry| load + dry)]
+        });
+        all.push(family.borne_out(|d| vec![late_torque(d, |load, _| load), late_torque(d, |_, dry| dry)]));
     }
 }
 
@@ -45,8 +53,8 @@ fn late_tip(dictionary: &Dictionary, weight: impl Fn(usize, usize) -> f64) -> Co
     })
 }
 
-/// `-d dτ/dt` of what the model asks of the motors.
-fn late_torque(dictionary: &Dictionary) -> Column {
+/// `-d dτ/dt` of what the model asks of the motors, made up of their load and their dry friction.
+fn late_torque(dictionary: &Dictionary, of: impl Fn(f64, f64) -> f64) -> Column {
     let problem = dictionary.problem;
     let mut column = Column::default();
     for j in 0..dictionary.joints() {
@@ -55,7 +63,7 @@ fn late_torque(dictionary: &Dictionary) -> Column {
         for (r, pair) in problem.pairs.iter().enumerate() {
             let sign = sign_series(&pair.real, j);
             let model: Vec<f64> =
-                problem.loads[r].iter().zip(&pair.real.rows).map(|(load, &i)| load.motor[j] + coulomb * sign[i]).collect();
+                problem.loads[r].iter().zip(&pair.real.rows).map(|(load, &i)| of(load.motor[j], coulomb * sign[i])).collect();
             let step = pair.real.rows.get(1).map_or(1.0, |second| (second - pair.real.rows[0]) as f64) * pair.real.run.dt_s;
             for k in 0..model.len() {
                 let (low, high) = (k.saturating_sub(1), (k + 1).min(model.len() - 1));
