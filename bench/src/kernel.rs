@@ -20,7 +20,7 @@ const SAME_MM: f64 = 0.2;
 const SLOW_ROUNDS: usize = 9;
 /// Read between two runs so that nothing is left in any cache, of an engine whose memory nobody knows as well: four times a third cache of
 /// 32 MiB.
-const EVICTED: usize = 128 << 20;
+pub(crate) const EVICTED: usize = 128 << 20;
 /// For so long before its input comes the service reads its weights again and again.
 const KEPT_WARM_NS: i64 = 200_000;
 /// Fewest times of which a thousandth is told.

@@ -1,6 +1,6 @@
 //! What the caches, huge pages, reading ahead and a core of one's own bring to a run of the network with weights of 16 bits.
 
-use crate::kernel::flush;
+use crate::kernel::{EVICTED, flush};
 use crate::table::{Table, quantiles};
 use ravenpose::network::{Format, InstructionSet, Plan};
 use ravenpose_importer::{Activation, Network, Random};
@@ -61,7 +61,8 @@ fn times(plan: &mut Plan, much: &[u8], before: Before, ahead: usize, runs: usize
     taken
 }
 
-/// Runs once a millisecond, as a process of its own: gives the quantiles of each shape and the huge pages in use, KiB.
+/// Runs once a millisecond, and with everything out of the caches, as a process of its own: gives the quantiles of each shape and the
+/// huge pages in use, KiB.
 pub(crate) fn asleep(small_pages: bool) -> Result<String, String> {
     if small_pages {
         rustix::thread::disable_transparent_huge_pages(true)
@@ -69,9 +70,12 @@ pub(crate) fn asleep(small_pages: bool) -> Result<String, String> {
     }
     let mut words = Vec::new();
     let mut plans = SHAPES.map(|(_, widths)| plan(&widths));
+    let much = vec![1_u8; EVICTED];
     for plan in &mut plans {
         times(plan, &[], Before::Sleep, 0, TURN);
-        words.extend(quantiles(&mut times(plan, &[], Before::Sleep, 0, RUNS)).map(|us| format!("{us:.3}")));
+        let asleep = times(plan, &[], Before::Sleep, 0, RUNS);
+        let evicted = times(plan, &much, Before::OtherData, 0, TURN);
+        words.extend([asleep, evicted].iter_mut().flat_map(|times| quantiles(times)).map(|us| format!("{us:.3}")));
     }
     // While the weights are there.
     let rollup = std::fs::read_to_string("/proc/self/smaps_rollup").unwrap_or_default();
@@ -81,13 +85,13 @@ pub(crate) fn asleep(small_pages: bool) -> Result<String, String> {
     Ok(words.join(" "))
 }
 
-/// [`asleep`] in another process: a row for each shape, and the KiB of huge pages.
+/// [`asleep`] in another process: two rows for each shape, and the KiB of huge pages.
 fn elsewhere(command: &mut Command) -> Result<(Vec<f64>, f64), String> {
     let output = command.output().map_err(|cause| format!("{command:?}: {cause}"))?;
     let text = String::from_utf8_lossy(&output.stdout);
     let numbers: Vec<f64> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     match numbers.split_last() {
-        Some((huge, rows)) if rows.len() == 4 * SHAPES.len() => Ok((rows.to_vec(), *huge)),
+        Some((huge, rows)) if rows.len() == 8 * SHAPES.len() => Ok((rows.to_vec(), *huge)),
         _ => Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()),
     }
 }
@@ -137,9 +141,11 @@ pub(crate) fn run(core: usize) -> Result<Table, String> {
         for ((name, ..), mut times) in parts.iter().zip(all) {
             table.row(name, &quantiles(&mut times));
         }
-        for (name, found) in &others {
-            let found = found.as_ref().and_then(|(rows, _)| rows.get(4 * number..4 * number + 4));
-            table.row(name, found.unwrap_or(&[f64::NAN; 4]));
+        for (what, at) in [("", 8 * number), (", everything out of the caches", 8 * number + 4)] {
+            for (name, found) in &others {
+                let found = found.as_ref().and_then(|(rows, _)| rows.get(at..at + 4));
+                table.row(&format!("{name}{what}"), found.unwrap_or(&[f64::NAN; 4]));
+            }
         }
     }
     Ok(table)

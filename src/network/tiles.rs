@@ -23,8 +23,10 @@ use ravenpose_importer::Activation;
 
 /// Inputs of a tile.
 const DEPTH: usize = 4;
-/// Most tiles side by side.
+/// Most tiles side by side: their sums fit the registers.
 const WIDTH: usize = 8;
+/// The same where each tile has two lines: what is read at wider strides is fetched ahead less well (decision 0013).
+const WIDTH_OF_TWO: usize = 6;
 
 /// Bits of the low digit of weights of 16 bits, of 12, and of 8, which have none.
 const BYTE: u32 = 8;
@@ -119,7 +121,7 @@ impl Tiles {
         // Of each tile: its panel's first tile and width, and the line where that begins.
         let mut panel_of = Vec::with_capacity(tiles);
         let mut lines = 0;
-        for (first, width) in panels(tiles) {
+        for (first, width) in panels(tiles, low) {
             panel_of.extend(std::iter::repeat_n((first, width, lines), width));
             lines += groups * lines_per_group(width, low);
         }
@@ -188,7 +190,7 @@ impl Tiles {
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
         let mut lines = &*self.lines;
-        for (first, width) in panels(self.across) {
+        for (first, width) in panels(self.across, LOW) {
             let (panel, behind) = lines.split_at(self.groups * lines_per_group(width, LOW));
             lines = behind;
             // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide, and these are its lines.
@@ -278,27 +280,29 @@ impl Tiles {
 }
 
 /// The panels of so many tiles: first tile, and how many lie side by side. As few panels as can be, as equal as can be.
-fn panels(tiles: usize) -> impl Iterator<Item = (usize, usize)> {
-    let count = tiles.div_ceil(WIDTH);
+fn panels(tiles: usize, low: u32) -> impl Iterator<Item = (usize, usize)> {
+    let count = tiles.div_ceil(if low == BYTE { WIDTH_OF_TWO } else { WIDTH });
     let (narrow, wider) = (tiles / count.max(1), tiles % count.max(1));
     (0..count).map(move |panel| (panel * narrow + panel.min(wider), narrow + usize::from(panel < wider)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BYTE, Format, NIBBLE, NONE, WIDTH, digits, panels};
+    use super::{BYTE, Format, NIBBLE, NONE, WIDTH, WIDTH_OF_TWO, digits, panels};
 
     #[test]
     fn panels_follow_one_another_and_differ_by_one_tile_at_most() {
-        for tiles in 1..200 {
+        for (tiles, (low, most)) in
+            (1..200).flat_map(|tiles| [(NONE, WIDTH), (NIBBLE, WIDTH), (BYTE, WIDTH_OF_TWO)].map(|low| (tiles, low)))
+        {
             let (mut first, mut widths) = (0, Vec::new());
-            for (start, width) in panels(tiles) {
+            for (start, width) in panels(tiles, low) {
                 assert!(start == first && width > 0, "{tiles} {first}");
                 widths.push(width);
                 first += width;
             }
             let (narrowest, widest) = (widths.iter().min().unwrap_or(&0), widths.iter().max().unwrap_or(&0));
-            assert!(first == tiles && *widest <= WIDTH && widest - narrowest <= 1, "{tiles}: {widths:?}");
+            assert!(first == tiles && *widest <= most && widest - narrowest <= 1, "{tiles}: {widths:?}");
         }
     }
 
