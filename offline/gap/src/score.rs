@@ -284,7 +284,6 @@ pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
         Bound::Free => true,
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
-        Bound::Sized(least, low, high) => x.abs() >= *least && (*low..=*high).contains(x),
         Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first.abs()),
         Bound::UpTo(times) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * own[before]),
     })

@@ -382,12 +382,13 @@ impl Search<'_, '_> {
         let grams = &self.grams(others, None);
         let base = self.scorer.fit(grams);
         self.scorer.untempered();
-        let mut all = best_claims(self.candidates.len(), &|k| self.score(grams, &base, &self.candidates[k]));
+        let mut all = best_claims(self.candidates.len(), &|k| self.score_of_start(grams, &base, &self.candidates[k]));
         // Effects that begin or end on the way: the claims that do something, again, in windows.
         let windows = self.windows();
         all.sort_by(|a, b| b.seen.total_cmp(&a.seen));
         let mut worth: Vec<Scored> = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.seen > 3.0).collect();
         let refined = self.refined_often(grams, &base, &all);
+        all.retain(|scored| self.is_borne_out(grams, scored));
         all.extend(refined);
         sort(&mut all);
         let mut claims = distinct(&all);
@@ -546,21 +547,26 @@ impl Search<'_, '_> {
         ends.chain(both).collect()
     }
 
-    /// Does the first part of a candidate that has parts say what the whole says?
-    fn is_borne_out(&self, grams: &Grams, candidate: &Candidate, coefficients: &[f64]) -> bool {
+    /// Is a candidate as large as it has to be, and does its first part say what the whole says?
+    fn is_borne_out(&self, grams: &Grams, Scored { candidate, coefficients, .. }: &Scored) -> bool {
         if candidate.apart.is_empty() {
             return true;
         }
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.apart));
         let first = fit.coefficients[fit.coefficients.len() - candidate.apart.len()];
-        first / coefficients[0] >= BORNE_OUT
+        coefficients[0].abs() >= candidate.family.least && BORNE_OUT.contains(&(first / coefficients[0]))
     }
 
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
+        self.score_of_start(grams, base, candidate).filter(|scored| self.is_borne_out(grams, scored))
+    }
+
+    /// The same of what may be more in a window, and is not held to what it has to be there.
+    fn score_of_start(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.columns));
         let coefficients = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
         let gain = self.scorer.gain(base, &fit);
-        (within_bounds(candidate, &fit) && self.is_borne_out(grams, candidate, &coefficients)).then(|| Scored {
+        within_bounds(candidate, &fit).then(|| Scored {
             candidate: candidate.clone(),
             gain,
             score: gain.nats - price(candidate),
@@ -570,8 +576,8 @@ impl Search<'_, '_> {
     }
 }
 
-/// Share of what a whole says that its first part has to say beside the others.
-const BORNE_OUT: f64 = 0.5;
+/// How much of what a whole says its first part has to say beside the others, and may say at most.
+const BORNE_OUT: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {

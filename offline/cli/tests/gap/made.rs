@@ -42,6 +42,22 @@ fn a_torque_is_late_in_all_it_holds_or_not_late() {
 }
 
 #[test]
+fn a_torque_that_is_late_in_the_end_of_a_run_is_late() {
+    // Over the whole of the run it would be late by less than counts.
+    let folder = Folder::new("late");
+    let late = Wanted {
+        signal: Some("torque".to_owned()),
+        interval: Some([9.0, 120.0]),
+        ..wanted("measurement_delay", None, &[("d", 0.004)])
+    };
+    let (case, _) = made(&folder, "late", &[late], 12.0);
+    let report = case.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "measurement_delay", "{}", report.summary);
+    near(first, "d", 0.004, 0.25);
+}
+
+#[test]
 fn a_weight_on_a_link_that_only_slides_is_a_weight() {
     // Half of what a weight may be shows nowhere there, but for the last digit of a right angle.
     let report = of_matrix("full", 278_625_836, "a9507affb344");

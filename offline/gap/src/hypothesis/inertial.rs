@@ -81,8 +81,9 @@ const TORQUE: Channel = Channel::JointTorque;
 const BEYOND_THE_TIP_M: f64 = 0.25;
 /// Share of a parameter's torque that no other one gives, from which it is told apart.
 const TOLD_APART: f64 = 0.1;
-/// Share of the largest torque of a unit of any parameter below which one gives none: what is left is rounding, of right angles in a URDF too.
-const NONE_AT_ALL: f64 = 1e-4;
+/// Share of the largest torque of a unit of any parameter below which one gives none: what is left is rounding, of right angles in a URDF too
+/// (1.57).
+const NONE_AT_ALL: f64 = 1e-3;
 /// Every parameter of a link: mass, first moments, second moments.
 const EVERY: [usize; PARAMETERS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
 

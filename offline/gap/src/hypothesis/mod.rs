@@ -33,8 +33,6 @@ pub enum Bound {
     Positive,
     /// Within these.
     Between(f64, f64),
-    /// Within the last two, and of at least the first in size.
-    Sized(f64, f64, f64),
     /// Positive, and at most so many times the coefficient before.
     UpTo(f64),
     /// At most so many times the first coefficient, of either sign.
@@ -80,6 +78,8 @@ pub struct Family {
     /// Numbers of its shape that its coefficients tell.
     pub follow: Option<Arc<Follow>>,
     columns: Arc<Columns>,
+    /// Least size of its coefficient, where it has parts.
+    pub least: f64,
     /// Parts of its one column: of what it explains, the first has to bear it out.
     apart: Option<Arc<Columns>>,
 }
@@ -115,6 +115,7 @@ impl Family {
             carry: None,
             follow: None,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
+            least: 0.0,
             apart: None,
         }
     }
@@ -146,6 +147,7 @@ impl Family {
             carry: None,
             follow: None,
             columns: Arc::new(columns),
+            least: 0.0,
             apart: None,
         }
     }
@@ -193,9 +195,10 @@ impl Family {
         self
     }
 
-    /// With the parts of its one column, of which the first has to say the same as the whole.
+    /// With the least size of its one coefficient, and the parts of its column, of which the first has to say the same as the whole.
     #[must_use]
-    pub fn borne_out(mut self, parts: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static) -> Self {
+    pub fn borne_out(mut self, least: f64, parts: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static) -> Self {
+        self.least = least;
         self.apart = Some(Arc::new(move |dictionary, _| parts(dictionary)));
         self
     }

@@ -5,7 +5,7 @@ use super::{Bound, Column, Family};
 use crate::nominal::sign_series;
 use crate::problem::Channel;
 
-/// Least delay of a torque, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
+/// Least delay of a torque, late or early, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
 const LEAST_LATE_S: f64 = 5e-4;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
@@ -35,11 +35,10 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
     if problem.cell(Channel::JointTorque, 0).is_some() {
         // Late is all of it. What only the sign of dry friction says is how that turns, slowly or after a moment's sticking.
-        let bound = Bound::Sized(LEAST_LATE_S, -0.15, 0.4);
         let family = Family::fixed("measurement_delay", &[], "torque", Channel::JointTorque, &[bound], |d| {
             vec![late_torque(d, |load, dry| load + dry)]
         });
-        all.push(family.borne_out(|d| vec![late_torque(d, |load, _| load), late_torque(d, |_, dry| dry)]));
+        all.push(family.borne_out(LEAST_LATE_S, |d| vec![late_torque(d, |load, _| load), late_torque(d, |_, dry| dry)]));
     }
 }
 
