@@ -547,14 +547,14 @@ impl Search<'_, '_> {
         ends.chain(both).collect()
     }
 
-    /// Is a candidate as large as it has to be, and does its first part say what the whole says?
+    /// Is a candidate as large as it has to be, and does its first part say no less than half of what the whole says?
     fn is_borne_out(&self, grams: &Grams, Scored { candidate, coefficients, .. }: &Scored) -> bool {
         if candidate.apart.is_empty() {
             return true;
         }
         let fit = self.scorer.fit(&self.scorer.extended(grams, &candidate.apart));
         let first = fit.coefficients[fit.coefficients.len() - candidate.apart.len()];
-        coefficients[0].abs() >= candidate.family.least && BORNE_OUT.contains(&(first / coefficients[0]))
+        coefficients[0].abs() >= candidate.family.least && first / coefficients[0] >= BORNE_OUT
     }
 
     fn score(&self, grams: &Grams, base: &Fit, candidate: &Candidate) -> Option<Scored> {
@@ -576,8 +576,8 @@ impl Search<'_, '_> {
     }
 }
 
-/// How much of what a whole says its first part has to say beside the others, and may say at most.
-const BORNE_OUT: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+/// How much of what a whole says its first part has to say at least beside the others, which may pull the whole the other way.
+const BORNE_OUT: f64 = 0.5;
 
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {

@@ -195,7 +195,7 @@ impl Family {
         self
     }
 
-    /// With the least size of its one coefficient, and the parts of its column, of which the first has to say the same as the whole.
+    /// With the least size of its one coefficient, and the parts of its column, of which the first has to say at least half as much.
     #[must_use]
     pub fn borne_out(mut self, least: f64, parts: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static) -> Self {
         self.least = least;
