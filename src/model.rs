@@ -117,14 +117,15 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// `weights i16, at most 0.6 um from float64 over 264 inputs`.
+    /// `weights i16, at most 0.6 um from float64 over 264 inputs, in huge pages`.
     pub fn weights(&self) -> String {
-        let Deviation { worst, inputs, .. } = self.deviation;
+        let (plan, Deviation { worst, inputs, .. }) = (&self.model.estimator.plan, self.deviation);
         format!(
-            "weights {}, at most {:.2} {} from float64 over {inputs} inputs",
-            self.model.estimator.plan.format(),
+            "weights {}, at most {:.2} {} from float64 over {inputs} inputs{}",
+            plan.format(),
             worst * 1000.0,
-            self.card.quantity.thousandth()
+            self.card.quantity.thousandth(),
+            if plan.is_in_huge_pages() { ", in huge pages" } else { "" }
         )
     }
 }

@@ -44,7 +44,7 @@ fn time(plans: &mut [Plan]) -> f64 {
 
 /// Both tables.
 pub(crate) fn run() -> Vec<Table> {
-    let plan = |network: &Network, format| Plan::with(network, InstructionSet::best(), format);
+    let plan = |network: &Network, format| Plan::with(network, InstructionSet::best(), format).in_one_piece();
     let mut sizes =
         Table::new("Growth with the network: 118-w-w-w-3, median us", &["weights k", "i16 MB", "i16", "GB/s", "f32", "GB/s"]);
     for width in WIDTHS {

@@ -234,7 +234,7 @@ fn kept_warm(network: &Network, contenders: &[Contender]) -> Vec<Contender> {
     let inputs = inputs(network);
     [Format::I16, Format::I12, Format::I8]
         .map(|format| {
-            let plan = Plan::with(network, InstructionSet::best(), format);
+            let plan = Plan::with(network, InstructionSet::best(), format).in_one_piece();
             let name = named(&plan);
             let floor = contenders.iter().find(|contender| contender.name == name).map_or(0, |contender| contender.floor);
             Contender::new(format!("{name}, kept warm"), Engine::KeptWarm(Box::new(plan)), floor, &inputs)
@@ -295,7 +295,7 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
         sets.extend((format == Format::I16).then_some(InstructionSet::Portable));
         sets.dedup();
         for set in sets {
-            let plan = Plan::with(network, set, format);
+            let plan = Plan::with(network, set, format).in_one_piece();
             let bytes = plan.bytes();
             let floor = floors.iter().find(|(of, _)| 50 * of.abs_diff(bytes) < bytes).map_or(all.len(), |(_, floor)| *floor);
             if floor == all.len() {
@@ -322,7 +322,7 @@ fn contenders(bytes: &[u8], model: &Path, network: &Network, expected: &Expected
     }
     let oracle = Oracle::new(bytes, expected).map_err(|error| error.to_string())?;
     all.push(Contender::new("tract, kept state".to_owned(), Engine::Tract(Box::new(oracle)), 0, &usual));
-    let plan = || Engine::Plan(Box::new(Plan::with(network, InstructionSet::best(), Format::F32)));
+    let plan = || Engine::Plan(Box::new(Plan::with(network, InstructionSet::best(), Format::F32).in_one_piece()));
     all.push(Contender::new("  ravenpose f32, denormal inputs".to_owned(), plan(), 0, &[vec![1e-40_f32; 118]]));
     let saturating: Vec<Vec<f32>> =
         (0..INPUTS).map(|row| (0..118).map(|i| if (row * 7 + i) % 3 == 0 { 1e4 } else { -1e4 }).collect()).collect();

@@ -23,8 +23,8 @@ compare by ratio, within one table. `make bench-ci` is the five-minute part; `RA
 - *kept warm* is how the service runs it: while it waits for a state it reads its weights, here for 0.2 ms before.
 - *everything out of the caches*: 128 MiB of other data are read before each run; of so few runs no thousandth is told.
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
-- *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last three
-  rows are processes of their own, one after the other: compare them with one another.
+- *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last six
+  rows are of three processes, one after the other: compare them with one another.
 - *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
 - The cost of a run is bytes over bandwidth: the growth tables give both. Below some 0.1 MB what is done once per layer counts, beyond
   the third cache the memory's bandwidth.

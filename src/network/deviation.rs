@@ -72,7 +72,7 @@ pub fn choose(network: &Network, golden: &[Vec<f32>], limit: f64, asked: Option<
         let deviation = measure(&mut plan, &inputs, &truths);
         // Written so that NaN fails.
         if deviation.worst <= limit || format == Format::F32 {
-            return Ok(Choice { plan, deviation });
+            return Ok(Choice { plan: plan.in_one_piece(), deviation });
         }
         last = Some(NotExactEnough { format, worst: deviation.worst, limit });
     }

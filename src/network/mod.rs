@@ -74,6 +74,8 @@ pub struct Plan {
     numbers: Numbers,
     instruction_set: InstructionSet,
     format: Format,
+    /// Are the weights in huge pages?
+    huge: bool,
     /// Where [`Plan::keep_warm`] goes on: layer and line.
     warm: (usize, usize),
 }
@@ -126,8 +128,7 @@ impl Plan {
         };
         let widest = network.layers.iter().map(|layer| layer.outputs).max().unwrap_or(0);
         let widest = lanes(widest.max(network.input_width));
-        let mut layers: Vec<Layer> = network.layers.iter().enumerate().map(layer).collect();
-        region::gather(layers.iter_mut().map(|layer| layer.weights.lines_mut()));
+        let layers = network.layers.iter().enumerate().map(layer).collect();
         let input_lanes = lanes(network.input_width);
         let ones = vec![1.0; network.input_width];
         let (shift, scale) = network.input_scale.as_ref().map_or_else(
@@ -139,7 +140,8 @@ impl Plan {
             output_width: network.output_width,
             shift,
             scale,
-            layers: layers.into(),
+            layers,
+            huge: false,
             front: zeros(widest),
             back: zeros(widest),
             #[cfg(target_arch = "x86_64")]
@@ -149,6 +151,21 @@ impl Plan {
             format,
             warm: (0, 0),
         }
+    }
+
+    /// Moves the weights of all layers into one piece of memory, in huge pages where the system has them: for a plan that is to run for long. It
+    /// may take milliseconds. A plan that was cloned before stays as it is.
+    #[must_use]
+    pub fn in_one_piece(mut self) -> Self {
+        if let Some(layers) = Arc::get_mut(&mut self.layers) {
+            self.huge = region::gather(layers.iter_mut().map(|layer| layer.weights.lines_mut()));
+        }
+        self
+    }
+
+    /// Are the weights in huge pages?
+    pub fn is_in_huge_pages(&self) -> bool {
+        self.huge
     }
 
     /// Number of inputs.

@@ -3,85 +3,145 @@
 //! Weights that have left the caches cost a walk through the page tables per page as well, and those have left them too: a page of
 //! 2 MiB needs one for the whole network, pages of 4 KiB hundreds (docs/decisions/0013).
 //!
-//! This module contains `unsafe`: pages seen as lines, and advice to the kernel about them.
+//! This module contains `unsafe`: a mapping of its own, seen as lines.
 
 use super::instructions::Line;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
-/// Lines of a huge page, of x86-64 and of Arm with pages of 4 KiB.
-const LINES: usize = (2 << 20) / size_of::<Line>();
 /// So many lines, a sixteenth of a huge page, are worth one.
-const WORTH_ONE: usize = LINES / 16;
-
-/// A huge page, where the kernel makes it one.
-#[repr(C, align(0x20_0000))]
-struct Page([Line; LINES]);
+const WORTH_ONE: usize = (2 << 20) / size_of::<Line>() / 16;
 
 /// Lines in one piece of memory.
 enum Region {
     Small(Box<[Line]>),
-    Huge { pages: Box<[Page]>, count: usize },
+    #[cfg(all(target_os = "linux", not(miri)))]
+    Huge(huge::Lines),
 }
 
 impl Region {
     /// All parts, one behind the other.
     fn of(parts: &[&[Line]]) -> Self {
-        let count: usize = parts.iter().map(|part| part.len()).sum();
-        if count < WORTH_ONE {
-            return Self::Small(parts.concat().into_boxed_slice());
+        #[cfg(all(target_os = "linux", not(miri)))]
+        if parts.iter().map(|part| part.len()).sum::<usize>() >= WORTH_ONE
+            && let Some(lines) = huge::Lines::of(parts)
+        {
+            return Self::Huge(lines);
         }
-        // SAFETY: a page is lines, a line is bytes, and any byte is one, zero too.
-        let pages = unsafe { Box::<[Page]>::new_zeroed_slice(count.div_ceil(LINES)).assume_init() };
-        let mut region = Self::Huge { pages, count };
-        let mut rest = region.lines_mut();
-        for part in parts {
-            let (here, behind) = rest.split_at_mut(part.len());
-            here.copy_from_slice(part);
-            rest = behind;
-        }
-        region
+        Self::Small(parts.concat().into_boxed_slice())
     }
 
     fn lines(&self) -> &[Line] {
         match self {
             Self::Small(lines) => lines,
-            // SAFETY: pages are lines without gaps, and `of` made as many pages as so many lines need.
-            Self::Huge { pages, count } => unsafe { std::slice::from_raw_parts(pages.as_ptr().cast(), *count) },
+            #[cfg(all(target_os = "linux", not(miri)))]
+            Self::Huge(lines) => lines,
         }
     }
 
-    fn lines_mut(&mut self) -> &mut [Line] {
-        match self {
-            Self::Small(lines) => lines,
-            // SAFETY: as above.
-            Self::Huge { pages, count } => unsafe { std::slice::from_raw_parts_mut(pages.as_mut_ptr().cast(), *count) },
-        }
+    fn is_huge(&self) -> bool {
+        !matches!(self, Self::Small(_))
+    }
+}
+
+#[cfg(all(target_os = "linux", not(miri)))]
+mod huge {
+    use super::Line;
+    use std::ops::Deref;
+    use std::ptr::NonNull;
+
+    /// A huge page of a machine whose pages have 4 KiB.
+    const HUGE: usize = 2 << 20;
+    const PAGE: libc::c_long = 4096;
+    /// Linux 6.1; the crate has it for glibc only.
+    const MADV_COLLAPSE: libc::c_int = 25;
+    /// What is in flux for a moment is asked for again.
+    const TRIES: usize = 3;
+
+    /// Lines in huge pages.
+    pub(super) struct Lines {
+        start: NonNull<Line>,
+        count: usize,
+        bytes: usize,
     }
 
-    /// Asks for huge pages in place of those that are there, now: what the kernel would do by and by would stop the loop. Where it refuses
-    /// (it is older than 6.1, or no such page is free) the lines stay where they are. Are they in huge pages now?
-    fn move_to_huge_pages(&mut self) -> bool {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Huge { pages, .. } => {
-                let (start, bytes) = (pages.as_mut_ptr(), size_of_val(&**pages));
-                let advise = |advice| {
-                    // SAFETY: the pages are this region's own, and none of these changes what they hold.
-                    unsafe { libc::madvise(start.cast(), bytes, advice) == 0 }
-                };
-                advise(libc::MADV_HUGEPAGE);
-                let moved = advise(libc::MADV_COLLAPSE);
-                advise(libc::MADV_NOHUGEPAGE);
-                moved
+    // SAFETY: it is plain memory of its own, which nobody writes once it is made.
+    unsafe impl Send for Lines {}
+    // SAFETY: as above.
+    unsafe impl Sync for Lines {}
+
+    impl Lines {
+        /// All parts, one behind the other; none where there are no huge pages for them: Linux before 6.1, other sizes of pages, or no memory in
+        /// one piece.
+        pub(super) fn of(parts: &[&[Line]]) -> Option<Self> {
+            // SAFETY: a question.
+            if unsafe { libc::sysconf(libc::_SC_PAGESIZE) } != PAGE {
+                return None;
             }
-            _ => false,
+            let count: usize = parts.iter().map(|part| part.len()).sum();
+            let bytes = (count * size_of::<Line>()).next_multiple_of(HUGE);
+            let lines = Self { start: mapped(bytes)?, count, bytes };
+            let mut at = lines.start;
+            for part in parts {
+                // SAFETY: the mapping has room for all parts, and nobody else knows it yet.
+                unsafe {
+                    std::ptr::copy_nonoverlapping(part.as_ptr(), at.as_ptr(), part.len());
+                    at = at.add(part.len());
+                }
+            }
+            // Now, and not by a daemon that would be woken for it and stop the loop: so it is told to keep off. Its pages are small, since
+            // nobody asked before they were filled.
+            let huge = (0..TRIES).any(|_| lines.advise(MADV_COLLAPSE));
+            lines.advise(libc::MADV_NOHUGEPAGE);
+            huge.then_some(lines)
+        }
+
+        fn advise(&self, advice: libc::c_int) -> bool {
+            // SAFETY: the mapping is its own, and no advice that is given here changes what it holds.
+            unsafe { libc::madvise(self.start.as_ptr().cast(), self.bytes, advice) == 0 }
+        }
+    }
+
+    impl Deref for Lines {
+        type Target = [Line];
+
+        fn deref(&self) -> &[Line] {
+            // SAFETY: so many lines were mapped and filled; a line is bytes.
+            unsafe { std::slice::from_raw_parts(self.start.as_ptr(), self.count) }
+        }
+    }
+
+    impl Drop for Lines {
+        fn drop(&mut self) {
+            // SAFETY: its own mapping, which nobody sees any more.
+            unsafe { libc::munmap(self.start.as_ptr().cast(), self.bytes) };
+        }
+    }
+
+    /// So many bytes of zeros, a multiple of a huge page, at a multiple of it.
+    fn mapped(bytes: usize) -> Option<NonNull<Line>> {
+        let (protection, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_PRIVATE | libc::MAP_ANONYMOUS);
+        // SAFETY: a new mapping, wherever there is room.
+        let all = unsafe { libc::mmap(std::ptr::null_mut(), bytes + HUGE, protection, flags, -1, 0) };
+        if all == libc::MAP_FAILED {
+            return None;
+        }
+        let before = all.align_offset(HUGE);
+        // SAFETY: what is in front of the first huge page and behind the last one, both within the new mapping.
+        unsafe {
+            let start = all.byte_add(before);
+            if before > 0 {
+                libc::munmap(all, before);
+            }
+            if before < HUGE {
+                libc::munmap(start.byte_add(bytes), HUGE - before);
+            }
+            NonNull::new(start.cast())
         }
     }
 }
 
 /// The lines of one layer, in a region of its own or in one with other layers.
-#[derive(Clone)]
 pub(super) struct Lines {
     region: Arc<Region>,
     own: Range<usize>,
@@ -104,21 +164,19 @@ impl From<Box<[Line]>> for Lines {
 /// Moves all of them into one region, in their order; says whether that is in huge pages.
 pub(super) fn gather<'a>(parts: impl Iterator<Item = &'a mut Lines>) -> bool {
     let mut parts: Vec<&mut Lines> = parts.collect();
-    let mut region = Region::of(&parts.iter().map(|lines| &***lines).collect::<Vec<_>>());
-    let moved = region.move_to_huge_pages();
-    let region = Arc::new(region);
+    let region = Arc::new(Region::of(&parts.iter().map(|lines| &***lines).collect::<Vec<_>>()));
     let mut end = 0;
     for lines in &mut parts {
         let own = end..end + lines.len();
         end = own.end;
         **lines = Lines { region: Arc::clone(&region), own };
     }
-    moved
+    region.is_huge()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{LINES, Line, Lines, Page, WORTH_ONE, gather};
+    use super::{Line, Lines, WORTH_ONE, gather};
 
     fn filled(count: usize, with: u8) -> Lines {
         vec![Line([with; 64]); count].into_boxed_slice().into()
@@ -126,27 +184,29 @@ mod tests {
 
     #[test]
     fn what_is_gathered_lies_in_order_in_one_piece_and_says_the_same() {
-        for counts in [[3, 0, 5], [WORTH_ONE, 7, 1], [LINES, 1, 3 * LINES + 1]] {
+        for counts in [[3, 0, 5], [WORTH_ONE, 7, 1], [16 * WORTH_ONE, 1, 48 * WORTH_ONE + 1]] {
             let mut parts: Vec<Lines> = counts.into_iter().zip(1..).map(|(count, with)| filled(count, with)).collect();
-            gather(parts.iter_mut());
+            let huge = gather(parts.iter_mut());
             for (part, (count, with)) in parts.iter().zip(counts.into_iter().zip(1_u8..)) {
                 assert!(part.len() == count && part.iter().all(|line| line.0 == [with; 64]), "{counts:?}");
             }
             for pair in parts.windows(2) {
                 assert_eq!(pair[0].as_ptr_range().end, pair[1].as_ptr_range().start, "{counts:?}");
             }
-            let aligned = if counts.iter().sum::<usize>() >= WORTH_ONE { align_of::<Page>() } else { align_of::<Line>() };
+            let aligned = if huge { 2 << 20 } else { 64 };
             assert_eq!(parts[0].as_ptr() as usize % aligned, 0, "{counts:?}");
         }
     }
 
     #[test]
     fn a_part_outlives_the_others() {
-        let mut parts = [filled(2, 1), filled(2, 9)];
-        gather(parts.iter_mut());
-        let [first, last] = parts;
-        drop(first);
-        assert!(last.iter().all(|line| line.0 == [9; 64]));
+        for count in [2, WORTH_ONE] {
+            let mut parts = [filled(count, 1), filled(count, 9)];
+            gather(parts.iter_mut());
+            let [first, last] = parts;
+            drop(first);
+            assert!(last.iter().all(|line| line.0 == [9; 64]));
+        }
     }
 
     #[test]
@@ -156,7 +216,7 @@ mod tests {
     }
 
     /// KiB of huge pages of the mapping that holds an address.
-    #[cfg(target_os = "linux")]
+    #[cfg(all(target_os = "linux", target_arch = "x86_64", not(miri)))]
     fn huge_kib(address: usize) -> Option<u64> {
         let maps = std::fs::read_to_string("/proc/self/smaps").ok()?;
         let begins = |line: &str| {
@@ -167,18 +227,16 @@ mod tests {
         lines.find_map(|line| line.strip_prefix("AnonHugePages:"))?.split_whitespace().next()?.parse().ok()
     }
 
-    #[cfg(target_os = "linux")]
+    /// Arm is emulated by what says yes to any advice.
+    #[cfg(all(target_os = "linux", target_arch = "x86_64", not(miri)))]
     #[test]
-    fn the_weights_of_a_network_are_where_they_are_said_to_be() {
-        let mut parts = [filled(LINES / 2, 3), filled(LINES / 2 + 1, 4)];
-        let moved = gather(parts.iter_mut());
-        assert!(parts.iter().zip(3..).all(|(part, with)| part.iter().all(|line| line.0 == [with; 64])));
-        let Some(kib) = huge_kib(parts[0].as_ptr() as usize) else { panic!("no /proc/self/smaps") };
-        if moved {
-            // Two, since a line is too many for one. The mapping may be one with its neighbours.
-            assert!(kib >= 2 * size_of::<Page>() as u64 / 1024, "{kib} KiB");
-        } else {
-            eprintln!("skipped: this kernel moves nothing to huge pages ({kib} KiB there)");
+    fn what_is_said_to_be_in_huge_pages_is() {
+        let mut parts = [filled(8 * WORTH_ONE, 3), filled(8 * WORTH_ONE + 1, 4)];
+        if !gather(parts.iter_mut()) {
+            return eprintln!("skipped: this kernel has no huge pages to give");
         }
+        // Two, since a line is too many for one. The mapping may be one with its neighbours.
+        let kib = huge_kib(parts[0].as_ptr() as usize).expect("/proc/self/smaps");
+        assert!(kib >= 4096, "{kib} KiB");
     }
 }
