@@ -42,7 +42,7 @@ fn nominal_runs_no_further_off_than_half_the_origins_simulator_and_fitted_less_t
 /// The third that the fit did not see: what it leaves there of standing still, and the origin's simulator beside it, each window of it
 /// shifted to the measured place at its start.
 #[test]
-fn on_the_third_that_it_was_not_fitted_to_the_fit_leaves_half_of_standing_still_on_two_motors() {
+fn on_the_third_that_it_was_not_fitted_to_the_fit_leaves_at_most_half_of_standing_still() {
     let Some(record) = recording() else { return };
     let from = record.len() * 2 / 3 / 1000 * 1000;
     let rest = record.part(from..record.len());
@@ -63,11 +63,15 @@ fn on_the_third_that_it_was_not_fitted_to_the_fit_leaves_half_of_standing_still_
     let still = standing_still_rms(&rest, 1000);
     let found = Replay::new(&fitted(), Side::Gold).expect("plant").rms(&rest, 1000);
     println!("last third, 1 s windows, rad RMS: origin {origin:.2?}, fitted {found:.2?}, standing still {still:.2?}");
+    // So few windows may flatter: those that begin elsewhere too.
+    for begin in (100..1000).step_by(100) {
+        let rest = rest.part(begin..rest.len());
+        let found = Replay::new(&fitted(), Side::Gold).expect("plant").rms(&rest, 1000);
+        println!("  the same from its row {begin} on: fitted {found:.2?}, standing still {:.2?}", standing_still_rms(&rest, 1000));
+    }
     for motor in 0..3 {
         assert!(found[motor] < origin[motor], "motor {}: {}", motor + 1, found[motor]);
-        // Half is asked for; motor 3 stays a little short of it.
-        let most = [0.5, 0.5, 0.6][motor];
-        assert!(found[motor] < most * still[motor], "motor {}: {} of {}", motor + 1, found[motor], still[motor]);
+        assert!(found[motor] <= 0.5 * still[motor], "motor {}: {} of {}", motor + 1, found[motor], still[motor]);
     }
 }
 
@@ -82,7 +86,7 @@ fn longer_free_runs_of_the_nominal_plant_stay_closer_than_the_origins_simulator(
         for motor in 0..3 {
             // The origin's free run over the whole recording (issue 3). The fitted set was fitted over one second at a time and a little
             // over five: over fourteen its motor 1 drifts away, as an open loop under gravity may.
-            assert!(window > 5000 || fitted[motor] < 0.4 * still[motor], "motor {}: {}", motor + 1, fitted[motor]);
+            assert!(window > 5000 || fitted[motor] < 0.5 * still[motor], "motor {}: {}", motor + 1, fitted[motor]);
             let origin = [98.0, 394.0, 129.0][motor];
             assert!(nominal[motor] < origin / 3.0, "motor {}: {}", motor + 1, nominal[motor]);
             assert!(window > 5000 || fitted[motor] < still[motor], "motor {}: {}", motor + 1, fitted[motor]);
