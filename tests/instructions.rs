@@ -20,8 +20,13 @@ const LOOP: f64 = 4_783.0;
 /// The same with a second model per arm, for the orientation.
 const BOTH: f64 = 8_655.0;
 /// The 600-500-400 network in every format that AVX2 has, the widest set that valgrind knows; `i12` is stored as `i16` there.
-const NETWORK: [(&str, f64); 5] =
-    [("f32", 143_840.0), ("f16", 217_240.0), ("bf16", 289_520.0), ("i16", 144_690.0), ("i8", 144_770.0)];
+const NETWORK: [(&str, f64); 5] = [
+    ("network-f32", 143_840.0),
+    ("network-f16", 217_240.0),
+    ("network-bf16", 289_520.0),
+    ("network-i16", 144_690.0),
+    ("network-i8", 144_770.0),
+];
 const TOLERANCE: f64 = 0.02;
 /// Cycles of the shorter and of the longer run; the rest of both is the same.
 const RUNS: [usize; 2] = [20, 220];
@@ -83,9 +88,8 @@ fn a_cycle_takes_the_instructions_that_it_took() {
     if InstructionSet::Avx2.available() != InstructionSet::Avx2 {
         return println!("skipped: instructions were counted with AVX2");
     }
-    let cycles = [("loop", LOOP), ("both", BOTH)].map(|(name, noted)| (name.to_owned(), noted));
-    for (name, expected) in cycles.into_iter().chain(NETWORK.map(|(format, noted)| (format!("network-{format}"), noted))) {
-        let [Some(few), Some(many)] = RUNS.map(|runs| count(&name, runs)) else {
+    for (name, expected) in [("loop", LOOP), ("both", BOTH)].into_iter().chain(NETWORK) {
+        let [Some(few), Some(many)] = RUNS.map(|runs| count(name, runs)) else {
             return println!("skipped: valgrind is absent");
         };
         let found = (many - few) / (RUNS[1] - RUNS[0]) as f64;

@@ -74,8 +74,6 @@ pub struct Plan {
     numbers: Numbers,
     instruction_set: InstructionSet,
     format: Format,
-    /// Are the weights in huge pages?
-    huge: bool,
     /// Where [`Plan::keep_warm`] goes on: layer and line.
     warm: (usize, usize),
 }
@@ -141,7 +139,6 @@ impl Plan {
             shift,
             scale,
             layers,
-            huge: false,
             front: zeros(widest),
             back: zeros(widest),
             #[cfg(target_arch = "x86_64")]
@@ -158,14 +155,14 @@ impl Plan {
     #[must_use]
     pub fn in_one_piece(mut self) -> Self {
         if let Some(layers) = Arc::get_mut(&mut self.layers) {
-            self.huge = region::gather(layers.iter_mut().map(|layer| layer.weights.lines_mut()));
+            region::gather(layers.iter_mut().map(|layer| layer.weights.lines_mut()));
         }
         self
     }
 
     /// Are the weights in huge pages?
     pub fn is_in_huge_pages(&self) -> bool {
-        self.huge
+        self.layers.iter().all(|layer| layer.weights.lines().is_huge())
     }
 
     /// Number of inputs.
@@ -275,19 +272,19 @@ impl Weights {
 
     fn lines(&self) -> &Lines {
         match self {
-            Self::Rows(rows) => rows.lines(),
-            Self::Pairs(pairs) => pairs.lines(),
+            Self::Rows(rows) => &rows.lines,
+            Self::Pairs(pairs) => &pairs.lines,
             #[cfg(target_arch = "x86_64")]
-            Self::Tiles(tiles) => tiles.lines(),
+            Self::Tiles(tiles) => &tiles.lines,
         }
     }
 
     fn lines_mut(&mut self) -> &mut Lines {
         match self {
-            Self::Rows(rows) => rows.lines_mut(),
-            Self::Pairs(pairs) => pairs.lines_mut(),
+            Self::Rows(rows) => &mut rows.lines,
+            Self::Pairs(pairs) => &mut pairs.lines,
             #[cfg(target_arch = "x86_64")]
-            Self::Tiles(tiles) => tiles.lines_mut(),
+            Self::Tiles(tiles) => &mut tiles.lines,
         }
     }
 }

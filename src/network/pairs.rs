@@ -55,7 +55,7 @@ impl Numbers {
 
 /// A layer's weights.
 pub(super) struct Pairs {
-    lines: Lines,
+    pub(super) lines: Lines,
     /// Groups of two inputs.
     groups: usize,
     /// Tiles side by side in the whole layer.
@@ -89,14 +89,6 @@ impl Pairs {
             }
         }
         Self { lines: lines.into(), groups, across: tiles, two: bytes == 2, start, scale }
-    }
-
-    pub(super) fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
-    pub(super) fn lines_mut(&mut self) -> &mut Lines {
-        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`; `numbers` is room to work in.

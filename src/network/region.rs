@@ -38,10 +38,6 @@ impl Region {
             Self::Huge(lines) => lines,
         }
     }
-
-    fn is_huge(&self) -> bool {
-        !matches!(self, Self::Small(_))
-    }
 }
 
 #[cfg(all(target_os = "linux", not(miri)))]
@@ -147,6 +143,13 @@ pub(super) struct Lines {
     own: Range<usize>,
 }
 
+impl Lines {
+    /// Are they in huge pages?
+    pub(super) fn is_huge(&self) -> bool {
+        !matches!(*self.region, Region::Small(_))
+    }
+}
+
 impl Deref for Lines {
     type Target = [Line];
 
@@ -161,8 +164,8 @@ impl From<Box<[Line]>> for Lines {
     }
 }
 
-/// Moves all of them into one region, in their order; says whether that is in huge pages.
-pub(super) fn gather<'a>(parts: impl Iterator<Item = &'a mut Lines>) -> bool {
+/// Moves all of them into one region, in their order.
+pub(super) fn gather<'a>(parts: impl Iterator<Item = &'a mut Lines>) {
     let mut parts: Vec<&mut Lines> = parts.collect();
     let region = Arc::new(Region::of(&parts.iter().map(|lines| &***lines).collect::<Vec<_>>()));
     let mut end = 0;
@@ -171,7 +174,6 @@ pub(super) fn gather<'a>(parts: impl Iterator<Item = &'a mut Lines>) -> bool {
         end = own.end;
         **lines = Lines { region: Arc::clone(&region), own };
     }
-    region.is_huge()
 }
 
 #[cfg(test)]
@@ -186,14 +188,14 @@ mod tests {
     fn what_is_gathered_lies_in_order_in_one_piece_and_says_the_same() {
         for counts in [[3, 0, 5], [WORTH_ONE, 7, 1], [16 * WORTH_ONE, 1, 48 * WORTH_ONE + 1]] {
             let mut parts: Vec<Lines> = counts.into_iter().zip(1..).map(|(count, with)| filled(count, with)).collect();
-            let huge = gather(parts.iter_mut());
+            gather(parts.iter_mut());
             for (part, (count, with)) in parts.iter().zip(counts.into_iter().zip(1_u8..)) {
                 assert!(part.len() == count && part.iter().all(|line| line.0 == [with; 64]), "{counts:?}");
             }
             for pair in parts.windows(2) {
                 assert_eq!(pair[0].as_ptr_range().end, pair[1].as_ptr_range().start, "{counts:?}");
             }
-            let aligned = if huge { 2 << 20 } else { 64 };
+            let aligned = if parts[0].is_huge() { 2 << 20 } else { 64 };
             assert_eq!(parts[0].as_ptr() as usize % aligned, 0, "{counts:?}");
         }
     }
@@ -212,7 +214,8 @@ mod tests {
     #[test]
     fn nothing_is_nothing() {
         let mut none = filled(0, 0);
-        assert!(!gather(std::iter::once(&mut none)) && none.is_empty());
+        gather(std::iter::once(&mut none));
+        assert!(!none.is_huge() && none.is_empty());
     }
 
     /// KiB of huge pages of the mapping that holds an address.
@@ -232,7 +235,8 @@ mod tests {
     #[test]
     fn what_is_said_to_be_in_huge_pages_is() {
         let mut parts = [filled(8 * WORTH_ONE, 3), filled(8 * WORTH_ONE + 1, 4)];
-        if !gather(parts.iter_mut()) {
+        gather(parts.iter_mut());
+        if !parts[0].is_huge() {
             return eprintln!("skipped: this kernel has no huge pages to give");
         }
         // Two, since a line is too many for one. The mapping may be one with its neighbours.

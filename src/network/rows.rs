@@ -46,7 +46,7 @@ impl Float {
 
 /// A layer's weights.
 pub(super) struct Rows {
-    lines: Lines,
+    pub(super) lines: Lines,
     /// Lanes of one row.
     row_lanes: usize,
     height: usize,
@@ -75,14 +75,6 @@ impl Rows {
             }
         }
         Self { lines: lines.into(), row_lanes, height: rows, float, scale }
-    }
-
-    pub(super) fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
-    pub(super) fn lines_mut(&mut self) -> &mut Lines {
-        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`.

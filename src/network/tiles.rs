@@ -95,7 +95,7 @@ impl Digits {
 
 /// A layer's weights.
 pub(super) struct Tiles {
-    lines: Lines,
+    pub(super) lines: Lines,
     /// Groups of four inputs.
     groups: usize,
     /// Tiles side by side in the whole layer.
@@ -153,14 +153,6 @@ impl Tiles {
             }
         }
         Self { lines: lines.into(), groups, across: tiles, low, start, start_mixed, scale: scales }
-    }
-
-    pub(super) fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
-    pub(super) fn lines_mut(&mut self) -> &mut Lines {
-        &mut self.lines
     }
 
     /// `output = activation(weights * input + bias)`; `digits` is room to work in.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The program, with its arguments to be added.
 pub(crate) fn program() -> Command {
@@ -60,8 +61,11 @@ pub(crate) fn with_effect(lines: &str) -> String {
 pub(crate) struct Folder(PathBuf);
 
 impl Folder {
+    /// Of its own, also beside another one of this name: tests of one program run at the same time.
     pub(crate) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ravenpose-{name}-{}", std::process::id()));
+        static MADE: AtomicUsize = AtomicUsize::new(0);
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("ravenpose-{name}-{}-{number}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path);
         std::fs::create_dir_all(&path).expect("folder");
         Self(path)

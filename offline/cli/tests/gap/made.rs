@@ -17,26 +17,32 @@ fn of_nothing_nothing_is_said() {
     assert!(!out.join("corrected.toml").exists());
 }
 
-/// A case of a matrix, judged.
-fn of_matrix(matrix: &str, seed: u64, id: &str) -> Report {
+/// A case of a matrix, judged, and how many effects it has.
+fn of_matrix(matrix: &str, seed: u64, id: &str) -> (Report, usize) {
     let folder = Folder::new(id);
     let orders = generator::matrix::named(matrix, seed).expect("a matrix");
     let order = orders.iter().find(|order| order.id() == id).expect("the case");
-    let (case, _) = written(&folder, order);
-    case.judged(&folder.file("out"))
+    let (case, truth) = written(&folder, order);
+    (case.judged(&folder.file("out")), truth.len())
 }
 
 /// A null of a matrix, which was an alarm once, is none.
 fn is_no_alarm(matrix: &str, seed: u64, id: &str) {
-    let report = of_matrix(matrix, seed, id);
+    let (report, effects) = of_matrix(matrix, seed, id);
+    assert_eq!(effects, 0);
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+}
+
+/// A signal that is late by so many seconds from a time on.
+fn late(signal: &str, by_s: f64, from_s: f64) -> Wanted {
+    Wanted { signal: Some(signal.to_owned()), interval: Some([from_s, 120.0]), ..wanted("measurement_delay", None, &[("d", by_s)]) }
 }
 
 #[test]
 fn a_torque_is_late_in_all_it_holds_or_not_late() {
     // A quarter of a millisecond, on a null; and dry friction that turns 3 ms late where an arm hardly moves, beside a drift.
     is_no_alarm("full", 278_625_836, "25a256671f4d");
-    let report = of_matrix("full", 278_625_836, "0cd486b7a074");
+    let (report, _) = of_matrix("full", 278_625_836, "0cd486b7a074");
     named(&report, "thermal_drift", "shoulder");
     assert_eq!(primary(&report).len(), 1, "{}", report.summary);
 }
@@ -45,12 +51,7 @@ fn a_torque_is_late_in_all_it_holds_or_not_late() {
 fn a_torque_that_is_late_in_the_end_of_a_run_is_late() {
     // Over the whole of the run it would be late by less than counts.
     let folder = Folder::new("late");
-    let late = Wanted {
-        signal: Some("torque".to_owned()),
-        interval: Some([9.0, 120.0]),
-        ..wanted("measurement_delay", None, &[("d", 0.004)])
-    };
-    let (case, _) = made(&folder, "late", &[late], 12.0);
+    let (case, _) = made(&folder, "late", &[late("torque", 0.004, 9.0)], 12.0);
     let report = case.judged(&folder.file("out"));
     let first = primary(&report)[0];
     assert_eq!(first.physics.to_string(), "measurement_delay", "{}", report.summary);
@@ -60,7 +61,7 @@ fn a_torque_that_is_late_in_the_end_of_a_run_is_late() {
 #[test]
 fn a_weight_on_a_link_that_only_slides_is_a_weight() {
     // Half of what a weight may be shows nowhere there, but for the last digit of a right angle.
-    let report = of_matrix("full", 278_625_836, "a9507affb344");
+    let (report, _) = of_matrix("full", 278_625_836, "a9507affb344");
     let first = primary(&report)[0];
     assert_eq!(first.physics.to_string(), "payload", "{}", report.summary);
     holds(first, "m_p", 0.0466, 0.1);
@@ -271,12 +272,7 @@ fn a_tool_that_is_turned_is_told_from_a_camera_that_is() {
 #[test]
 fn a_tip_that_comes_late_from_the_middle_of_the_runs_on_is_seen() {
     let folder = Folder::new("late");
-    let late = Wanted {
-        signal: Some("tip".to_owned()),
-        interval: Some([5.0, 120.0]),
-        ..wanted("measurement_delay", None, &[("d", 0.08)])
-    };
-    let (case, _) = made(&folder, "late", &[late], 12.0);
+    let (case, _) = made(&folder, "late", &[late("tip", 0.08, 5.0)], 12.0);
     let report = case.judged(&folder.file("out"));
     let verdicts = primary(&report);
     assert_eq!(
