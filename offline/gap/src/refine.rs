@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, GROUND};
+use crate::hypothesis::{BEFORE, Candidate, Dictionary, Family, GROUND};
 
 /// Halvings of a step before a number is settled.
 const HALVINGS: usize = 7;
@@ -12,8 +12,9 @@ const SECANTS: usize = 4;
 const EDGE_S: f64 = 0.1;
 /// The same of a memory of the whole motion.
 const SHARP_ROUNDS: usize = 10;
-/// Rounds over all numbers of a shape.
+/// Rounds over all numbers of a shape, at most, and over those of which one makes up for another: how slow, and since when.
 const ROUNDS: usize = 2;
+const ROUNDS_IN_VALLEYS: usize = 12;
 
 /// Every family at every point of its grid.
 pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidate> {
@@ -51,15 +52,20 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
     // Sharp and long valleys: memories that the motion shows in every sample.
     let rounds = if family.form == GROUND {
         SHARP_ROUNDS
+    } else if family.shape.contains(&BEFORE) {
+        ROUNDS_IN_VALLEYS
     } else if free.len() + best.edges() > 1 {
         ROUNDS
     } else {
         1
     };
+    let first = best.shape.clone();
     for _ in 0..rounds {
+        let before = least;
         for &k in &free {
-            let mut step =
-                family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, best.shape[k]));
+            // In a valley each round begins with the steps of the first: from where a number came to rest, the grid may be next to nothing away.
+            let from = if rounds == ROUNDS_IN_VALLEYS { first[k] } else { best.shape[k] };
+            let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, from));
             for _ in 0..HALVINGS + if rounds == SHARP_ROUNDS { 5 } else { 0 } {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
@@ -78,6 +84,9 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
             }
         }
         edges_moved(dictionary, &mut best, &mut least, misfit);
+        if least >= before {
+            break;
+        }
     }
     best
 }

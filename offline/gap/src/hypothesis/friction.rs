@@ -25,6 +25,13 @@ const STATIC_EXCESS: f64 = 3.0;
 const SETTLING_S: [f64; 1] = [0.004];
 /// Time constants of heating, s.
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+/// What warms up or creeps began so long before the recording, to begin with, s: a moment, since drives move before one records. Taken for none
+/// it bends what follows, and time constants of a recording's length come out half as long.
+pub(super) const BEFORE_S: [f64; 1] = [0.5];
+/// No longer, s: what has been under way for long is hardly told from what was always there.
+const BEFORE_MOST_S: f64 = 1.0;
+/// Its name in a shape.
+pub(crate) const BEFORE: &str = "before";
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if !dictionary.problem.has(Channel::JointTorque) {
@@ -98,9 +105,9 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     "friction fades",
                     TORQUE,
                     &[Bound::Free],
-                    &[&[("T", true)], names].concat(),
-                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t], &s[..]].concat())).collect(),
-                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, s[0]), &smooth(d, place, &s[1..], sign)), false)],
+                    &[&[("T", true), (BEFORE, true)], names].concat(),
+                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t, BEFORE_S[0]], &s[..]].concat())).collect(),
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],
                 )
                 .penalised(2.0),
             );
@@ -169,10 +176,15 @@ fn stribeck(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), sh
     signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 
-/// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square.
-pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64> {
+/// How long before the recording a claim says that it began, s.
+pub(super) fn began_before(shape_s: f64) -> f64 {
+    shape_s.clamp(0.0, BEFORE_MOST_S)
+}
+
+/// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square. Shape: T and how long before a run h was zero, s.
+pub(super) fn heat(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
     // Faster heating is no heating: it would pass for a constant.
-    let heating_s = heating_s.max(HEATING_S[0]);
+    let (heating_s, before_s) = (shape[0].max(HEATING_S[0]), began_before(shape[1]));
     let squares = dictionary.at_grid(|r, i, k| {
         let problem = dictionary.problem;
         let torque = problem.pairs[r].real.torque.as_ref().map_or(problem.loads[r][k].motor[j], |torque| torque[j][i]);
@@ -190,7 +202,7 @@ pub(super) fn heat(dictionary: &Dictionary, j: usize, heating_s: f64) -> Vec<f64
             let before = row.checked_sub(1).map(|b| dictionary.grid[b]).filter(|b| b.0 == r);
             match before {
                 Some(before) => h += (i - before.1) as f64 * pair.run.dt_s * square / mean,
-                None => h = pair.run.elapsed_s(i),
+                None => h = before_s + pair.run.elapsed_s(i),
             }
             1.0 - (-h / heating_s).exp()
         })

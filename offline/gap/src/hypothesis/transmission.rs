@@ -1,6 +1,7 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
 use super::dictionary::{Dictionary, minus, size, times};
+use super::friction::{BEFORE, BEFORE_S, HEATING_S, began_before, heat};
 use super::{Bound, Column, Family, product};
 use crate::problem::Channel;
 use crate::run::Run;
@@ -214,13 +215,28 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         };
         all.push(family.limited(&limits).following(follow).penalised(3.0));
     }
-    let times = product(&[&CREEP_S]);
-    for (form, settled) in [("settled at the start", 1.0), ("fresh at the start", 0.0)] {
-        let columns = move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], settled))];
-        let bounds = [Bound::Positive];
-        let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &bounds, &[("T_k", true)], times.clone(), columns);
-        all.push(family.penalised(1.0));
-    }
+    let settled = Family::shaped(
+        "cable_creep",
+        &[j],
+        "settled at the start",
+        TRANSMISSION,
+        &[Bound::Positive],
+        &[("T_k", true)],
+        product(&[&CREEP_S]),
+        move |d, s| vec![d.strain_of(j, crept(d, j, s[0], 1.0))],
+    );
+    all.push(settled.penalised(1.0));
+    let fresh = Family::shaped(
+        "cable_creep",
+        &[j],
+        "fresh at the start",
+        TRANSMISSION,
+        &[Bound::Positive],
+        &[("T_k", true), (BEFORE, true)],
+        product(&[&CREEP_S, &BEFORE_S]),
+        move |d, s| vec![d.strain_of(j, crept(d, j, s[0], 1.0 - (-began_before(s[1]) / s[0]).exp()))],
+    );
+    all.push(fresh.penalised(1.0));
     if dictionary.problem.robot.simulates_itself {
         // Where it has crept before: that dies away.
         let columns = move |d: &Dictionary, s: &[f64]| {
@@ -246,9 +262,9 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             "position",
             TRANSMISSION,
             &[Bound::Free],
-            &[("T", true)],
-            product(&[&super::friction::HEATING_S]),
-            move |d, s| vec![d.strain_of(j, super::friction::heat(d, j, s[0]))],
+            &[("T", true), (BEFORE, true)],
+            product(&[&HEATING_S, &BEFORE_S]),
+            move |d, s| vec![d.strain_of(j, heat(d, j, s))],
         )
         .penalised(3.0),
     );
