@@ -49,22 +49,22 @@ pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> C
         least = misfit(&best);
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
+    let in_a_valley = family.shape.contains(&BEFORE);
     // Sharp and long valleys: memories that the motion shows in every sample.
     let rounds = if family.form == GROUND {
         SHARP_ROUNDS
-    } else if family.shape.contains(&BEFORE) {
+    } else if in_a_valley {
         ROUNDS_IN_VALLEYS
     } else if free.len() + best.edges() > 1 {
         ROUNDS
     } else {
         1
     };
-    let first = best.shape.clone();
     for _ in 0..rounds {
         let before = least;
         for &k in &free {
             // In a valley each round begins with the steps of the first: from where a number came to rest, the grid may be next to nothing away.
-            let from = if rounds == ROUNDS_IN_VALLEYS { first[k] } else { best.shape[k] };
+            let from = if in_a_valley { start.shape[k] } else { best.shape[k] };
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, from));
             for _ in 0..HALVINGS + if rounds == SHARP_ROUNDS { 5 } else { 0 } {
                 let here = best.shape[k];

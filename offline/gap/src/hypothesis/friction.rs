@@ -27,7 +27,7 @@ const SETTLING_S: [f64; 1] = [0.004];
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 /// What warms up or creeps began so long before the recording, to begin with, s: a moment, since drives move before one records. Taken for none
 /// it bends what follows, and time constants of a recording's length come out half as long.
-pub(super) const BEFORE_S: [f64; 1] = [0.5];
+pub(super) const BEFORE_S: f64 = 0.5;
 /// No longer, s: what has been under way for long is hardly told from what was always there.
 const BEFORE_MOST_S: f64 = 1.0;
 /// Its name in a shape.
@@ -106,7 +106,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     TORQUE,
                     &[Bound::Free],
                     &[&[("T", true), (BEFORE, true)], names].concat(),
-                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t, BEFORE_S[0]], &s[..]].concat())).collect(),
+                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t, BEFORE_S], &s[..]].concat())).collect(),
                     move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],
                 )
                 .penalised(2.0),

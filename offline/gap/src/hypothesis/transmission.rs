@@ -48,6 +48,9 @@ const PERIODS: (f64, f64, usize) = (0.03, 2.5, 36);
 
 const TRANSMISSION: Channel = Channel::Transmission;
 
+/// What share of its load a cable has settled to at the start of a run, of a shape.
+type Settled = fn(&[f64]) -> f64;
+
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let problem = dictionary.problem;
     for j in 0..dictionary.joints() {
@@ -215,28 +218,15 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         };
         all.push(family.limited(&limits).following(follow).penalised(3.0));
     }
-    let settled = Family::shaped(
-        "cable_creep",
-        &[j],
-        "settled at the start",
-        TRANSMISSION,
-        &[Bound::Positive],
-        &[("T_k", true)],
-        product(&[&CREEP_S]),
-        move |d, s| vec![d.strain_of(j, crept(d, j, s[0], 1.0))],
-    );
-    all.push(settled.penalised(1.0));
-    let fresh = Family::shaped(
-        "cable_creep",
-        &[j],
-        "fresh at the start",
-        TRANSMISSION,
-        &[Bound::Positive],
-        &[("T_k", true), (BEFORE, true)],
-        product(&[&CREEP_S, &BEFORE_S]),
-        move |d, s| vec![d.strain_of(j, crept(d, j, s[0], 1.0 - (-began_before(s[1]) / s[0]).exp()))],
-    );
-    all.push(fresh.penalised(1.0));
+    let fresh: Settled = |s| 1.0 - (-began_before(s[1]) / s[0]).exp();
+    for (form, shape, grid, settled) in [
+        ("settled at the start", &[("T_k", true)][..], product(&[&CREEP_S]), (|_| 1.0) as Settled),
+        ("fresh at the start", &[("T_k", true), (BEFORE, true)], product(&[&CREEP_S, &[BEFORE_S]]), fresh),
+    ] {
+        let columns = move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], settled(s)))];
+        let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &[Bound::Positive], shape, grid, columns);
+        all.push(family.penalised(1.0));
+    }
     if dictionary.problem.robot.simulates_itself {
         // Where it has crept before: that dies away.
         let columns = move |d: &Dictionary, s: &[f64]| {
@@ -263,7 +253,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             TRANSMISSION,
             &[Bound::Free],
             &[("T", true), (BEFORE, true)],
-            product(&[&HEATING_S, &BEFORE_S]),
+            product(&[&HEATING_S, &[BEFORE_S]]),
             move |d, s| vec![d.strain_of(j, heat(d, j, s))],
         )
         .penalised(3.0),
