@@ -44,7 +44,7 @@ fn see(name: &str, clock: Option<&Path>) -> Seen {
     let mut began = None;
     let mut last = (0, 0);
     let now_s = || SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).expect("after 1970").as_secs();
-    world.until("some seconds", || {
+    world.until("some seconds, and a wrong clock where one jumps", || {
         while let Some(pose) = reader.next().expect("pose") {
             assert!(whole(&pose), "{pose:?}");
             assert!(pose.sequence > last.0 && pose.source_sequence > last.1, "{pose:?} after {last:?}");
@@ -62,7 +62,9 @@ fn see(name: &str, clock: Option<&Path>) -> Seen {
         if let Ok(stats) = serde_json::from_slice::<Stats>(&stats) {
             seen.hours_off.insert((stats.written_unix_s as i64 - now_s() as i64 + 1800).div_euclid(3600));
         }
-        began.is_some_and(|(began, _)| began.elapsed() > LASTING)
+        // A clock that jumps has to be met while it is wrong, or nothing was tested.
+        let met = clock.is_none() || seen.hours_off.len() > 1;
+        met && began.is_some_and(|(began, _)| began.elapsed() > LASTING)
     });
     service.signal(libc::SIGTERM);
     assert_eq!(service.end().code(), Some(0), "{}", world.log());
@@ -106,7 +108,6 @@ fn a_wall_clock_that_jumps_changes_nothing() {
         let right = see("clockright", None);
         let jumping = see("clockjumps", Some(&clock));
         assert_eq!(right.hours_off, BTreeSet::from([0]));
-        assert!(jumping.hours_off.len() > 1, "the service's clock does not jump: {jumping:?}");
         assert_eq!((&jumping.arms, &jumping.intervals), (&right.arms, &right.intervals));
         assert_eq!(right.intervals, (true, 3));
     });

@@ -1,12 +1,13 @@
-/* To be preloaded: the wall clock of the process jumps. Each 20 ms it is another one of right, an hour behind, right but ten per cent
- * fast, an hour and a leap second ahead. Everything else, CLOCK_MONOTONIC above all, is as the kernel says. */
+/* To be preloaded: the wall clock of the process jumps. Each 20.4 ms it is another one of right, an hour behind, right but ten per cent
+ * fast, an hour and a leap second ahead. Everything else, CLOCK_MONOTONIC above all, is as the kernel says.
+ * A second is 49 of these turns, 12 times round and one on: what is written once per second meets all four, one after the other. */
 #define _GNU_SOURCE
 #include <sys/syscall.h>
 #include <sys/time.h>
 #include <time.h>
 #include <unistd.h>
 
-enum { SECOND = 1000000000, TURN = 20000000 };
+enum { SECOND = 1000000000, TURN = SECOND / 49 };
 
 static long long ns(const struct timespec *t) { return t->tv_sec * (long long)SECOND + t->tv_nsec; }
 
