@@ -143,6 +143,28 @@ fn hysteresis_as_large_as_the_noise_is_told_from_a_zero_that_is_off() {
 }
 
 #[test]
+fn hysteresis_whose_numbers_stand_at_their_limits_is_found_and_measured() {
+    // Its memory begins between nothing and what the first load leaves in a new cable. The search once stopped at the limit of g.
+    let (report, _) = of_matrix("full", 629_759_738, "8ac11ab8318f");
+    let first = named(&report, "cable_hysteresis", "shoulder");
+    near(first, "k", 1359.0, 0.1);
+    near(first, "z_m", 0.0044, 0.15);
+}
+
+#[test]
+fn hysteresis_begins_each_run_where_that_run_found_it() {
+    let folder = Folder::new("begun");
+    let effects = vec![wanted("cable_hysteresis", Some(1), &[("a", 0.4), ("k", 1400.0), ("z_m", 0.0044), ("n", 1.5), ("g", 0.7)])];
+    let order = Order { seed: 3, label: "mr3".to_owned(), effects, seconds: 12.0, runs: 5, ..Order::default() };
+    let (case, truth) = written(&folder, &order);
+    let report = case.judged(&folder.file("out"));
+    let first = named(&report, "cable_hysteresis", truth[0].joint_name.as_ref().expect("a joint"));
+    // One start for all runs gains 118 nats, one of each 6205.
+    assert!(first.evidence[0].statistic > 1000.0, "{:?}", first.evidence);
+    near(first, "a", 0.4, 0.2);
+}
+
+#[test]
 fn a_pulley_out_of_true_is_found_in_a_small_part_of_its_turn() {
     // The joint moves through less than a third of a turn, where a sine is nearly the straight line of a wrong ratio.
     let folder = Folder::new("turn");

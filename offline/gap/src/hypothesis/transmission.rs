@@ -17,13 +17,18 @@ const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// Bouc-Wen elements to begin with: shares of the straight spring, the same where its stiffness is known, yield loads over the RMS
-/// load, exponents, what the memory holds at the start (over what it can hold), and how alike loading and unloading bend.
+/// load, exponents, and how alike loading and unloading bend.
 const STRAIGHT: [f64; 2] = [0.3, 0.7];
 const STRAIGHT_OWN: [f64; 2] = [0.5, 0.85];
 const YIELD: [f64; 4] = [0.12, 0.35, 0.9, 1.8];
 const POWER: [f64; 1] = [1.4];
-const HELD: [f64; 2] = [0.0, 0.9];
 const ALIKE: [f64; 2] = [0.5, 0.85];
+/// What the memory of an element holds at the start, to begin with: shares of what the first load leaves in a new one, and of its yield
+/// load, which a larger load left.
+const STARTED_OF_NEW: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
+const STARTED_OF_YIELD: f64 = 0.9;
+/// Steps in which a load comes on.
+const LOADED_IN: u32 = 8;
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
 const MOST_ALIKE: f64 = 0.93;
 /// The form of a coupling by a cable that has play itself.
@@ -173,9 +178,26 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
-    let numbers = |a: bool| [("a", a), ("yield", true), ("n", true), ("start", true), ("g", true)];
+    let first = first_loads(dictionary, j);
+    let runs = first.len();
+    let numbers = |a: bool| {
+        let mut all = vec![("a", a), ("yield", true), ("n", true), ("g", true)];
+        all.resize(all.len() + runs, ("start", true));
+        all
+    };
     let yields = YIELD.map(|share| share * usual);
-    let limits = [[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [-1.0, 1.0], [0.5, MOST_ALIKE]];
+    let mut limits = vec![[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [0.5, MOST_ALIKE]];
+    limits.resize(limits.len() + runs, [-1.0, 1.0]);
+    let grid = |straight: &[f64]| {
+        let element = product(&[straight, &yields, &POWER, &ALIKE]);
+        let begun = |shape: &Vec<f64>| {
+            let started = |held: &dyn Fn(f64) -> f64| [shape.clone(), first.iter().map(|load| held(*load)).collect()].concat();
+            let mut all: Vec<Vec<f64>> = STARTED_OF_NEW.iter().map(|share| started(&|load| share * of_new(load, shape))).collect();
+            all.push(started(&|load| STARTED_OF_YIELD * load.signum()));
+            all
+        };
+        element.iter().flat_map(begun).collect::<Vec<Vec<f64>>>()
+    };
     all.push(
         Family::shaped(
             "cable_hysteresis",
@@ -184,16 +206,17 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             TRANSMISSION,
             &[Bound::Positive, Bound::Free],
             &numbers(true),
-            product(&[&STRAIGHT, &yields, &POWER, &HELD, &ALIKE]),
+            grid(&STRAIGHT),
             move |d, s| {
                 let load = d.cable_load(j);
-                vec![d.strain_of(j, per_run(d, &load, |run| bouc_wen(run, s))), d.strain_of(j, load)]
+                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, r))), d.strain_of(j, load)]
             },
         )
         .limited(&limits)
         .penalised(3.0),
     );
     let own = dictionary.problem.nominal.compliance[j][0];
+    let straight = limits[0];
     if own > 0.0 {
         // The coefficient is the share that yields: near the share for which a column is made, the deflection goes with it.
         let family = Family::shaped(
@@ -201,19 +224,20 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &[j],
             OWN_STIFFNESS,
             TRANSMISSION,
-            &[Bound::Between(0.0, limits[0][1])],
+            &[Bound::Between(0.0, straight[1])],
             &numbers(false),
-            product(&[&STRAIGHT_OWN, &yields, &POWER, &HELD, &ALIKE]),
+            grid(&STRAIGHT_OWN),
             move |d, s| {
                 let load = d.cable_load(j);
                 let per_share = own / (1.0 - s[0]);
-                let beyond = |run: &[f64]| bouc_wen(run, s).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect();
+                let beyond =
+                    |r: usize, run: &[f64]| bouc_wen(run, s, r).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect();
                 vec![d.strain_of(j, per_run(d, &load, beyond))]
             },
         );
         let follow = move |s: &[f64], theta: &[f64]| {
             let mut shape = s.to_vec();
-            shape[0] = (1.0 - theta[0]).clamp(limits[0][0], limits[0][1]);
+            shape[0] = (1.0 - theta[0]).clamp(straight[0], straight[1]);
             shape
         };
         all.push(family.limited(&limits).following(follow).penalised(3.0));
@@ -304,15 +328,25 @@ fn row_period(motion: &crate::motion::Motion) -> f64 {
 }
 
 /// A memory of a grid series, run by run.
-fn per_run(dictionary: &Dictionary, series: &[f64], memory: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+fn per_run(dictionary: &Dictionary, series: &[f64], mut memory: impl FnMut(usize, &[f64]) -> Vec<f64>) -> Vec<f64> {
     let mut out = Vec::with_capacity(series.len());
     let mut start = 0;
-    for pair in dictionary.problem.pairs {
+    for (r, pair) in dictionary.problem.pairs.iter().enumerate() {
         let end = start + pair.real.rows.len();
-        out.extend(memory(&series[start..end]));
+        out.extend(memory(r, &series[start..end]));
         start = end;
     }
     out
+}
+
+/// Load of a cable where each run begins; 0 of a run without rows.
+fn first_loads(dictionary: &Dictionary, j: usize) -> Vec<f64> {
+    let mut first = Vec::new();
+    per_run(dictionary, &dictionary.cable_load(j), |_, run| {
+        first.push(run.first().copied().unwrap_or(0.0));
+        run.to_vec()
+    });
+    first
 }
 
 /// Bends of a spring to the ground, over one deflection: those that depend on the way, and those that turn with it, over the first.
@@ -365,27 +399,54 @@ fn remembered(deflection: &[f64], p: f64, q: f64) -> Vec<f64> {
     out.split_off(settle)
 }
 
-/// Deflection times stiffness of a Bouc-Wen element under a load, where `load = a x + (1 - a) z`. Shape: a, yield load, n, the
-/// share of its yield load that z holds at the start (of the load's sign), which nobody knows, and g.
-fn bouc_wen(load: &[f64], shape: &[f64]) -> Vec<f64> {
-    let [straight, yields, power, held, alike] = *shape else { return load.to_vec() };
-    let first = load.first().copied().unwrap_or(0.0);
-    let mut z = held.clamp(-1.0, 1.0) * yields * first.signum();
-    let mut x = (first - (1.0 - straight) * z) / straight;
-    let mut before = first;
+/// A Bouc-Wen element under a load, `load = a x + (1 - a) z`: deflection times stiffness, and its memory.
+struct BoucWen {
+    straight: f64,
+    yields: f64,
+    power: f64,
+    alike: f64,
+    x: f64,
+    z: f64,
+}
+
+impl BoucWen {
+    /// Of a shape (a, yield load, n, g, ...), new and without load.
+    fn new(shape: &[f64]) -> Self {
+        Self { straight: shape[0], yields: shape[1], power: shape[2], alike: shape[3], x: 0.0, z: 0.0 }
+    }
+
+    /// A little more load: `zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z)))`.
+    fn load(&mut self, more: f64) {
+        let bend = if more * self.z >= 0.0 { 1.0 } else { 2.0 * self.alike - 1.0 };
+        let slope = 1.0 - (self.z.abs() / self.yields).powf(self.power) * bend;
+        let dx = more / (self.straight + (1.0 - self.straight) * slope);
+        self.x += dx;
+        self.z = (self.z + slope * dx).clamp(-self.yields, self.yields);
+    }
+}
+
+/// Share of its yield load that the memory of a new element of a shape holds under its first load.
+fn of_new(load: f64, shape: &[f64]) -> f64 {
+    let mut element = BoucWen::new(shape);
+    (0..LOADED_IN).for_each(|_| element.load(load / f64::from(LOADED_IN)));
+    element.z / element.yields
+}
+
+/// Deflection times stiffness of a Bouc-Wen element under the load of a run. After the numbers of the element its shape has, of each run that
+/// it was fitted to, the share of its yield load that z holds at the start, which nobody knows; of another run it is their mean.
+fn bouc_wen(load: &[f64], shape: &[f64], run: usize) -> Vec<f64> {
+    let (element, starts) = shape.split_at(4);
+    let held = starts.get(run).copied().unwrap_or_else(|| crate::nominal::mean(starts));
+    let mut element = BoucWen::new(element);
+    let mut before = load.first().copied().unwrap_or(0.0);
+    element.z = held.clamp(-1.0, 1.0) * element.yields;
+    element.x = (before - (1.0 - element.straight) * element.z) / element.straight;
     load.iter()
         .map(|&now| {
             let step = (now - before) / 8.0;
-            for _ in 0..8 {
-                // zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z)))
-                let bend = if step * z >= 0.0 { 1.0 } else { 2.0 * alike - 1.0 };
-                let slope = 1.0 - (z.abs() / yields).powf(power) * bend;
-                let dx = step / (straight + (1.0 - straight) * slope);
-                x += dx;
-                z = (z + slope * dx).clamp(-yields, yields);
-            }
+            (0..8).for_each(|_| element.load(step));
             before = now;
-            x
+            element.x
         })
         .collect()
 }

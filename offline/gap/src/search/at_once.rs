@@ -1,7 +1,7 @@
 //! Shapes whose numbers are refined all at once: those of a memory depend on each other.
 
 use super::{Scored, Search, simpler_is_enough};
-use crate::hypothesis::{Candidate, Window};
+use crate::hypothesis::{Candidate, Column, Window};
 use crate::intervals::slope;
 use crate::refine::edges_moved;
 use crate::score::{Fit, Grams};
@@ -34,12 +34,10 @@ impl Search<'_, '_> {
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
         let (mut least, mut theta) = self.fitted(base, best);
         for _ in 0..STEPS {
-            let mut columns = best.columns.to_vec();
-            columns.extend(free.iter().map(|k| slope(self.dictionary, best, &theta, *k)));
-            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
-            let moves = &fit.coefficients[fit.coefficients.len() - free.len()..];
+            let slopes: Vec<Column> = free.iter().map(|k| slope(self.dictionary, best, &theta, *k)).collect();
+            let moves = self.moves(base, best, &free, &slopes);
             // No further at once than a third of what a number can be.
-            let furthest = free.iter().zip(moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
+            let furthest = free.iter().zip(&moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
             if !furthest.is_finite() {
                 return;
             }
@@ -47,7 +45,7 @@ impl Search<'_, '_> {
             let told = family.follow.as_ref().map_or_else(|| best.shape.clone(), |follow| follow(&best.shape, &theta));
             let there = [1.0, 0.4, 0.12, 0.03].into_iter().find_map(|part| {
                 let mut shape: Vec<f64> = best.shape.iter().zip(&told).map(|(here, there)| here + part * (there - here)).collect();
-                for (k, by) in free.iter().zip(moves) {
+                for (k, by) in free.iter().zip(&moves) {
                     shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
                 }
                 let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
@@ -60,6 +58,32 @@ impl Search<'_, '_> {
             if done {
                 return;
             }
+        }
+    }
+
+    /// Where the free numbers of a shape should go, of their slopes. One that stands at its limit and would go beyond stays, and the others
+    /// go where they should without it.
+    fn moves(&self, base: &Grams, best: &Candidate, free: &[usize], slopes: &[Column]) -> Vec<f64> {
+        let mut held = vec![false; free.len()];
+        loop {
+            let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
+            let mut columns = best.columns.to_vec();
+            columns.extend(moving.iter().map(|i| slopes[*i].clone()));
+            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
+            let mut moves = vec![0.0; free.len()];
+            for (i, by) in moving.iter().zip(&fit.coefficients[fit.coefficients.len() - moving.len()..]) {
+                moves[*i] = *by;
+            }
+            let beyond = |i: &usize| {
+                let [low, high] = best.family.limits[free[*i]];
+                let here = best.shape[free[*i]];
+                (here <= low && moves[*i] < 0.0) || (here >= high && moves[*i] > 0.0)
+            };
+            let outward: Vec<usize> = moving.into_iter().filter(beyond).collect();
+            if outward.is_empty() {
+                return moves;
+            }
+            outward.into_iter().for_each(|i| held[i] = true);
         }
     }
 
