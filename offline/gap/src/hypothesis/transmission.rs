@@ -1,5 +1,7 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
+use std::sync::Arc;
+
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, began_before, heat};
 use super::{Bound, Column, Family, product};
@@ -29,6 +31,8 @@ const STARTED_OF_NEW: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
 const STARTED_OF_YIELD: f64 = 0.9;
 /// Steps in which a load comes on.
 const LOADED_IN: u32 = 8;
+/// Numbers of an element's law, after which what it holds at the start of each run follows: nobody knows that.
+const ELEMENT: usize = 4;
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
 const MOST_ALIKE: f64 = 0.93;
 /// The form of a coupling by a cable that has play itself.
@@ -179,15 +183,20 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
     let first = first_loads(dictionary, j);
-    let runs = first.len();
+    let runs: Arc<[String]> = dictionary.problem.pairs.iter().map(|pair| pair.real.run.id.clone()).collect();
     let numbers = |a: bool| {
         let mut all = vec![("a", a), ("yield", true), ("n", true), ("g", true)];
-        all.resize(all.len() + runs, ("start", true));
+        all.resize(all.len() + first.len(), ("start", true));
         all
     };
     let yields = YIELD.map(|share| share * usual);
     let mut limits = vec![[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [0.5, MOST_ALIKE]];
-    limits.resize(limits.len() + runs, [-1.0, 1.0]);
+    limits.resize(limits.len() + first.len(), [-1.0, 1.0]);
+    // Of another run than those that the starts are of: their mean.
+    let start = move |d: &Dictionary, r: usize, shape: &[f64]| {
+        let starts = &shape[ELEMENT..];
+        if runs.get(r) == Some(&d.problem.pairs[r].real.run.id) { starts[r] } else { crate::nominal::mean(starts) }
+    };
     let grid = |straight: &[f64]| {
         let element = product(&[straight, &yields, &POWER, &ALIKE]);
         let begun = |shape: &Vec<f64>| {
@@ -198,6 +207,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         };
         element.iter().flat_map(begun).collect::<Vec<Vec<f64>>>()
     };
+    let start_of_own = start.clone();
     all.push(
         Family::shaped(
             "cable_hysteresis",
@@ -209,7 +219,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             grid(&STRAIGHT),
             move |d, s| {
                 let load = d.cable_load(j);
-                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, r))), d.strain_of(j, load)]
+                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, start(d, r, s)))), d.strain_of(j, load)]
             },
         )
         .limited(&limits)
@@ -230,8 +240,9 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             move |d, s| {
                 let load = d.cable_load(j);
                 let per_share = own / (1.0 - s[0]);
-                let beyond =
-                    |r: usize, run: &[f64]| bouc_wen(run, s, r).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect();
+                let beyond = |r: usize, run: &[f64]| {
+                    bouc_wen(run, s, start_of_own(d, r, s)).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect()
+                };
                 vec![d.strain_of(j, per_run(d, &load, beyond))]
             },
         );
@@ -432,12 +443,10 @@ fn of_new(load: f64, shape: &[f64]) -> f64 {
     element.z / element.yields
 }
 
-/// Deflection times stiffness of a Bouc-Wen element under the load of a run. After the numbers of the element its shape has, of each run that
-/// it was fitted to, the share of its yield load that z holds at the start, which nobody knows; of another run it is their mean.
-fn bouc_wen(load: &[f64], shape: &[f64], run: usize) -> Vec<f64> {
-    let (element, starts) = shape.split_at(4);
-    let held = starts.get(run).copied().unwrap_or_else(|| crate::nominal::mean(starts));
-    let mut element = BoucWen::new(element);
+/// Deflection times stiffness of a Bouc-Wen element of a shape under the load of a run, at the start of which its memory holds this share of
+/// its yield load.
+fn bouc_wen(load: &[f64], shape: &[f64], held: f64) -> Vec<f64> {
+    let mut element = BoucWen::new(shape);
     let mut before = load.first().copied().unwrap_or(0.0);
     element.z = held.clamp(-1.0, 1.0) * element.yields;
     element.x = (before - (1.0 - element.straight) * element.z) / element.straight;
