@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, began_before, heat};
 use super::{Bound, Column, Family, product};
+use crate::linear::dot;
 use crate::problem::Channel;
 use crate::run::Run;
 
@@ -192,10 +193,16 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let yields = YIELD.map(|share| share * usual);
     let mut limits = vec![[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [0.5, MOST_ALIKE]];
     limits.resize(limits.len() + first.len(), [-1.0, 1.0]);
-    // Of another run than those that the starts are of: their mean.
-    let start = move |d: &Dictionary, r: usize, shape: &[f64]| {
-        let starts = &shape[ELEMENT..];
-        if runs.get(r) == Some(&d.problem.pairs[r].real.run.id) { starts[r] } else { crate::nominal::mean(starts) }
+    let fitted = first.clone();
+    let start = move |d: &Dictionary, r: usize, shape: &[f64], load: &[f64]| {
+        let (element, starts) = shape.split_at(ELEMENT);
+        if runs.get(r) == Some(&d.problem.pairs[r].real.run.id) {
+            return starts[r];
+        }
+        // A run that was not fitted: the same share of what its own first load leaves in a new element.
+        let of_fitted: Vec<f64> = fitted.iter().map(|load| of_new(*load, element)).collect();
+        let share = dot(starts, &of_fitted) / dot(&of_fitted, &of_fitted).max(f64::MIN_POSITIVE);
+        share * of_new(load.first().copied().unwrap_or(0.0), element)
     };
     let grid = |straight: &[f64]| {
         let element = product(&[straight, &yields, &POWER, &ALIKE]);
@@ -219,7 +226,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             grid(&STRAIGHT),
             move |d, s| {
                 let load = d.cable_load(j);
-                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, start(d, r, s)))), d.strain_of(j, load)]
+                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, start(d, r, s, run)))), d.strain_of(j, load)]
             },
         )
         .limited(&limits)
@@ -241,7 +248,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                 let load = d.cable_load(j);
                 let per_share = own / (1.0 - s[0]);
                 let beyond = |r: usize, run: &[f64]| {
-                    bouc_wen(run, s, start_of_own(d, r, s)).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect()
+                    bouc_wen(run, s, start_of_own(d, r, s, run)).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect()
                 };
                 vec![d.strain_of(j, per_run(d, &load, beyond))]
             },
