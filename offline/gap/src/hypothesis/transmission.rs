@@ -446,7 +446,9 @@ impl BoucWen {
 /// Share of its yield load that the memory of a new element of a shape holds under its first load.
 fn of_new(load: f64, shape: &[f64]) -> f64 {
     let mut element = BoucWen::new(shape);
-    (0..LOADED_IN).for_each(|_| element.load(load / f64::from(LOADED_IN)));
+    for _ in 0..LOADED_IN {
+        element.load(load / f64::from(LOADED_IN));
+    }
     element.z / element.yields
 }
 
@@ -460,7 +462,9 @@ fn bouc_wen(load: &[f64], shape: &[f64], held: f64) -> Vec<f64> {
     load.iter()
         .map(|&now| {
             let step = (now - before) / 8.0;
-            (0..8).for_each(|_| element.load(step));
+            for _ in 0..8 {
+                element.load(step);
+            }
             before = now;
             element.x
         })

@@ -83,7 +83,9 @@ impl Search<'_, '_> {
             if outward.is_empty() {
                 return moves;
             }
-            outward.into_iter().for_each(|i| held[i] = true);
+            for i in outward {
+                held[i] = true;
+            }
         }
     }
 
