@@ -1,6 +1,6 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, Window, rounds};
+use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, START, Window, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parameters::{Named, parameters};
 use crate::robot::Robot;
@@ -188,14 +188,10 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
 /// Change of the effect per unit of each refined number of its shape, and of each edge of its window.
 fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<(Slope, Column)> {
     let family = &candidate.family;
-    let mut all = Vec::new();
-    for (k, step) in family.steps.iter().enumerate() {
-        // What rounds a sign or a crossing is not asked for.
-        if step.is_none() || rounds(family.shape[k]) {
-            continue;
-        }
-        all.push((Slope::Shape(k), slope(dictionary, candidate, theta, k)));
-    }
+    // What rounds a sign or a crossing is not asked for.
+    let asked: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some() && !rounds(family.shape[*k])).collect();
+    let of_numbers = slopes_of(dictionary, candidate, theta, &asked);
+    let mut all: Vec<(Slope, Column)> = asked.into_iter().map(Slope::Shape).zip(of_numbers).collect();
     for edge in 0..2 {
         let Some(window) = candidate.window.filter(|window| window[edge].is_finite()) else { continue };
         let step = 0.04;
@@ -210,14 +206,28 @@ fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<
     all
 }
 
-/// Change of the effect per unit of a number of its shape.
-pub(crate) fn slope(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], k: usize) -> Column {
+/// Change of the effect per unit of each of these numbers of its shape.
+pub(crate) fn slopes_of(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], numbers: &[usize]) -> Vec<Column> {
+    // Each run has a start of its own, and none reaches another run: all are moved together.
+    let starts: Vec<usize> = (0..candidate.shape.len()).filter(|k| candidate.family.shape[*k] == START).collect();
+    let of_starts = numbers.iter().any(|k| starts.contains(k)).then(|| slope(dictionary, candidate, theta, &starts));
+    let of_number = |k: &usize| match (starts.iter().position(|start| start == k), &of_starts) {
+        (Some(run), Some(together)) => together.of_run(dictionary.problem, run),
+        _ => slope(dictionary, candidate, theta, &[*k]),
+    };
+    numbers.iter().map(of_number).collect()
+}
+
+/// Change of the effect per unit by which some numbers of its shape are moved.
+fn slope(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], numbers: &[usize]) -> Column {
     let family = &candidate.family;
-    let span = family.limits.get(k).map_or(0.0, |limits| limits[1] - limits[0]);
-    let step = (1e-3 * candidate.shape[k].abs()).max(1e-7).max(1e-4 * span);
+    let span = |k: usize| family.limits.get(k).map_or(0.0, |limits| limits[1] - limits[0]);
+    let step = numbers.iter().map(|k| (1e-3 * candidate.shape[*k].abs()).max(1e-7).max(1e-4 * span(*k))).fold(0.0, f64::max);
     let at = |sign: f64| {
         let mut shape = candidate.shape.clone();
-        shape[k] += sign * step;
+        for k in numbers {
+            shape[*k] += sign * step;
+        }
         Candidate::new(dictionary, family, &shape, candidate.window)
     };
     difference(&at(1.0), &at(-1.0), theta, 2.0 * step)

@@ -55,6 +55,16 @@ impl Column {
         });
         Self { parts: parts.collect() }
     }
+
+    /// What of it lies in one run.
+    #[must_use]
+    pub fn of_run(&self, problem: &Problem, run: usize) -> Self {
+        let parts = self.parts.iter().map(|(cell, values)| {
+            let there = values.iter().zip(&problem.cells[*cell].rows).map(|(x, &(r, _))| if r == run { *x } else { 0.0 });
+            (*cell, there.collect())
+        });
+        Self { parts: parts.collect() }
+    }
 }
 
 /// Series at the rows that all joint cells share (the grid), and at those of the tip.

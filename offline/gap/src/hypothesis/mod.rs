@@ -10,7 +10,7 @@ mod timing;
 mod transmission;
 mod unknown;
 
-pub(crate) use transmission::{GROUND, LATE_COUPLING, OWN_STIFFNESS};
+pub(crate) use transmission::{GROUND, LATE_COUPLING, OWN_STIFFNESS, START};
 pub use unknown::UNMODELLED;
 pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 

@@ -32,6 +32,8 @@ const STARTED_OF_NEW: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
 const STARTED_OF_YIELD: f64 = 0.9;
 /// Steps in which a load comes on.
 const LOADED_IN: u32 = 8;
+/// Name of what a memory holds at the start of a run: one number of each run, in their order.
+pub(crate) const START: &str = "start";
 /// Numbers of an element's law, after which what it holds at the start of each run follows: nobody knows that.
 const ELEMENT: usize = 4;
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
@@ -187,7 +189,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let runs: Arc<[String]> = dictionary.problem.pairs.iter().map(|pair| pair.real.run.id.clone()).collect();
     let numbers = |a: bool| {
         let mut all = vec![("a", a), ("yield", true), ("n", true), ("g", true)];
-        all.resize(all.len() + first.len(), ("start", true));
+        all.resize(all.len() + first.len(), (START, true));
         all
     };
     let yields = YIELD.map(|share| share * usual);

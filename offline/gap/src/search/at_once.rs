@@ -2,7 +2,7 @@
 
 use super::{Scored, Search, simpler_is_enough};
 use crate::hypothesis::{Candidate, Column, Window};
-use crate::intervals::slope;
+use crate::intervals::slopes_of;
 use crate::refine::edges_moved;
 use crate::score::{Fit, Grams};
 
@@ -34,8 +34,7 @@ impl Search<'_, '_> {
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
         let (mut least, mut theta) = self.fitted(base, best);
         for _ in 0..STEPS {
-            let slopes: Vec<Column> = free.iter().map(|k| slope(self.dictionary, best, &theta, *k)).collect();
-            let moves = self.moves(base, best, &free, &slopes);
+            let moves = self.moves(base, best, &free, &slopes_of(self.dictionary, best, &theta, &free));
             // No further at once than a third of what a number can be.
             let furthest = free.iter().zip(&moves).map(|(k, by)| by.abs() / span(*k)).fold(0.0, f64::max);
             if !furthest.is_finite() {
