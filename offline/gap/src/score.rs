@@ -31,6 +31,25 @@ pub struct Grams {
     parts: Vec<Parts>,
 }
 
+impl Grams {
+    /// Of some of the columns, in their order.
+    #[must_use]
+    pub fn only(&self, columns: &[usize]) -> Self {
+        let kept: Vec<usize> = columns.iter().copied().chain([self.columns]).collect();
+        let of_kept = |sums: &DMatrix<f64>| DMatrix::from_fn(kept.len(), kept.len(), |i, j| sums[(kept[i], kept[j])]);
+        Self {
+            columns: columns.len(),
+            sums: self.sums.iter().map(|cell| cell.iter().map(of_kept).collect()).collect(),
+            parts: columns.iter().map(|k| self.parts[*k].clone()).collect(),
+        }
+    }
+
+    /// How many columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+}
+
 /// A fitted set.
 #[derive(Debug, Clone)]
 pub struct Fit {

@@ -45,23 +45,23 @@ impl Column {
     /// The same within a window of each run only, s from its start.
     #[must_use]
     pub fn within(&self, problem: &Problem, [from_s, to_s]: Window) -> Self {
-        let parts = self.parts.iter().map(|(cell, values)| {
-            let rows = &problem.cells[*cell].rows;
-            let begun = values.iter().zip(rows).map(|(x, &(r, i))| {
-                let t = problem.pairs[r].real.run.elapsed_s(i);
-                if t >= from_s && t < to_s { *x } else { 0.0 }
-            });
-            (*cell, begun.collect())
-        });
-        Self { parts: parts.collect() }
+        self.only(problem, |r, i| {
+            let t = problem.pairs[r].real.run.elapsed_s(i);
+            t >= from_s && t < to_s
+        })
     }
 
     /// What of it lies in one run.
     #[must_use]
     pub fn of_run(&self, problem: &Problem, run: usize) -> Self {
+        self.only(problem, |r, _| r == run)
+    }
+
+    /// What of it lies in some rows, of which run and sample are told.
+    fn only(&self, problem: &Problem, there: impl Fn(usize, usize) -> bool) -> Self {
         let parts = self.parts.iter().map(|(cell, values)| {
-            let there = values.iter().zip(&problem.cells[*cell].rows).map(|(x, &(r, _))| if r == run { *x } else { 0.0 });
-            (*cell, there.collect())
+            let rows = &problem.cells[*cell].rows;
+            (*cell, values.iter().zip(rows).map(|(x, &(r, i))| if there(r, i) { *x } else { 0.0 }).collect())
         });
         Self { parts: parts.collect() }
     }

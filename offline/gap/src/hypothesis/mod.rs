@@ -4,13 +4,15 @@ mod actuation;
 mod dictionary;
 mod environment;
 mod friction;
+mod hysteresis;
 mod inertial;
 mod kinematic;
 mod timing;
 mod transmission;
 mod unknown;
 
-pub(crate) use transmission::{GROUND, LATE_COUPLING, OWN_STIFFNESS, START};
+pub(crate) use hysteresis::{OWN_STIFFNESS, START};
+pub(crate) use transmission::{GROUND, LATE_COUPLING};
 pub use unknown::UNMODELLED;
 pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 

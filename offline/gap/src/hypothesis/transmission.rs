@@ -1,11 +1,8 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
-use std::sync::Arc;
-
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, began_before, heat};
-use super::{Bound, Column, Family, product};
-use crate::linear::dot;
+use super::{Bound, Column, Family, hysteresis, product};
 use crate::problem::Channel;
 use crate::run::Run;
 
@@ -19,31 +16,10 @@ const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
 const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
 /// Loads over which a loaded joint crosses its play, shares of the RMS load.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
-/// Bouc-Wen elements to begin with: shares of the straight spring, the same where its stiffness is known, yield loads over the RMS
-/// load, exponents, and how alike loading and unloading bend.
-const STRAIGHT: [f64; 2] = [0.3, 0.7];
-const STRAIGHT_OWN: [f64; 2] = [0.5, 0.85];
-const YIELD: [f64; 4] = [0.12, 0.35, 0.9, 1.8];
-const POWER: [f64; 1] = [1.4];
-const ALIKE: [f64; 2] = [0.5, 0.85];
-/// What the memory of an element holds at the start, to begin with: shares of what the first load leaves in a new one, and of its yield
-/// load, which a larger load left.
-const STARTED_OF_NEW: [f64; 4] = [0.0, 0.3, 0.6, 1.0];
-const STARTED_OF_YIELD: f64 = 0.9;
-/// Steps in which a load comes on.
-const LOADED_IN: u32 = 8;
-/// Name of what a memory holds at the start of a run: one number of each run, in their order.
-pub(crate) const START: &str = "start";
-/// Numbers of an element's law, after which what it holds at the start of each run follows: nobody knows that.
-const ELEMENT: usize = 4;
-/// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
-const MOST_ALIKE: f64 = 0.93;
 /// The form of a coupling by a cable that has play itself.
 pub(crate) const LATE_COUPLING: &str = "position, with play";
 /// A spring to the ground whose force has a memory.
 pub(crate) const GROUND: &str = "to the ground";
-/// Bouc-Wen, the cable as stiff as in the simulation.
-pub(crate) const OWN_STIFFNESS: &str = "Bouc-Wen, of the simulation's stiffness";
 /// Times the furthest that a joint is seen, and the range that it has, within which it was homed.
 const HOMED: f64 = 2.0;
 /// Time constants of creep, s.
@@ -185,83 +161,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
-    let first = first_loads(dictionary, j);
-    let runs: Arc<[String]> = dictionary.problem.pairs.iter().map(|pair| pair.real.run.id.clone()).collect();
-    let numbers = |a: bool| {
-        let mut all = vec![("a", a), ("yield", true), ("n", true), ("g", true)];
-        all.resize(all.len() + first.len(), (START, true));
-        all
-    };
-    let yields = YIELD.map(|share| share * usual);
-    let mut limits = vec![[0.03, 0.97], [0.02 * usual, 6.0 * usual], [1.0, 3.0], [0.5, MOST_ALIKE]];
-    limits.resize(limits.len() + first.len(), [-1.0, 1.0]);
-    let fitted = first.clone();
-    let start = move |d: &Dictionary, r: usize, shape: &[f64], load: &[f64]| {
-        let (element, starts) = shape.split_at(ELEMENT);
-        if runs.get(r) == Some(&d.problem.pairs[r].real.run.id) {
-            return starts[r];
-        }
-        // A run that was not fitted: the same share of what its own first load leaves in a new element.
-        let of_fitted: Vec<f64> = fitted.iter().map(|load| of_new(*load, element)).collect();
-        let share = dot(starts, &of_fitted) / dot(&of_fitted, &of_fitted).max(f64::MIN_POSITIVE);
-        share * of_new(load.first().copied().unwrap_or(0.0), element)
-    };
-    let grid = |straight: &[f64]| {
-        let element = product(&[straight, &yields, &POWER, &ALIKE]);
-        let begun = |shape: &Vec<f64>| {
-            let started = |held: &dyn Fn(f64) -> f64| [shape.clone(), first.iter().map(|load| held(*load)).collect()].concat();
-            let mut all: Vec<Vec<f64>> = STARTED_OF_NEW.iter().map(|share| started(&|load| share * of_new(load, shape))).collect();
-            all.push(started(&|load| STARTED_OF_YIELD * load.signum()));
-            all
-        };
-        element.iter().flat_map(begun).collect::<Vec<Vec<f64>>>()
-    };
-    let start_of_own = start.clone();
-    all.push(
-        Family::shaped(
-            "cable_hysteresis",
-            &[j],
-            "Bouc-Wen",
-            TRANSMISSION,
-            &[Bound::Positive, Bound::Free],
-            &numbers(true),
-            grid(&STRAIGHT),
-            move |d, s| {
-                let load = d.cable_load(j);
-                vec![d.strain_of(j, per_run(d, &load, |r, run| bouc_wen(run, s, start(d, r, s, run)))), d.strain_of(j, load)]
-            },
-        )
-        .limited(&limits)
-        .penalised(3.0),
-    );
-    let own = dictionary.problem.nominal.compliance[j][0];
-    let straight = limits[0];
-    if own > 0.0 {
-        // The coefficient is the share that yields: near the share for which a column is made, the deflection goes with it.
-        let family = Family::shaped(
-            "cable_hysteresis",
-            &[j],
-            OWN_STIFFNESS,
-            TRANSMISSION,
-            &[Bound::Between(0.0, straight[1])],
-            &numbers(false),
-            grid(&STRAIGHT_OWN),
-            move |d, s| {
-                let load = d.cable_load(j);
-                let per_share = own / (1.0 - s[0]);
-                let beyond = |r: usize, run: &[f64]| {
-                    bouc_wen(run, s, start_of_own(d, r, s, run)).iter().zip(run).map(|(x, load)| per_share * (x - load)).collect()
-                };
-                vec![d.strain_of(j, per_run(d, &load, beyond))]
-            },
-        );
-        let follow = move |s: &[f64], theta: &[f64]| {
-            let mut shape = s.to_vec();
-            shape[0] = (1.0 - theta[0]).clamp(straight[0], straight[1]);
-            shape
-        };
-        all.push(family.limited(&limits).following(follow).penalised(3.0));
-    }
+    hysteresis::push(dictionary, j, usual, all);
     let fresh: Settled = |s| 1.0 - (-began_before(s[1]) / s[0]).exp();
     for (form, shape, grid, settled) in [
         ("settled at the start", &[("T_k", true)][..], product(&[&CREEP_S]), (|_| 1.0) as Settled),
@@ -347,28 +247,6 @@ fn row_period(motion: &crate::motion::Motion) -> f64 {
     motion.rows.get(1).map_or(0.0, |second| (second - motion.rows[0]) as f64 * motion.run.dt_s)
 }
 
-/// A memory of a grid series, run by run.
-fn per_run(dictionary: &Dictionary, series: &[f64], mut memory: impl FnMut(usize, &[f64]) -> Vec<f64>) -> Vec<f64> {
-    let mut out = Vec::with_capacity(series.len());
-    let mut start = 0;
-    for (r, pair) in dictionary.problem.pairs.iter().enumerate() {
-        let end = start + pair.real.rows.len();
-        out.extend(memory(r, &series[start..end]));
-        start = end;
-    }
-    out
-}
-
-/// Load of a cable where each run begins; 0 of a run without rows.
-fn first_loads(dictionary: &Dictionary, j: usize) -> Vec<f64> {
-    let mut first = Vec::new();
-    per_run(dictionary, &dictionary.cable_load(j), |_, run| {
-        first.push(run.first().copied().unwrap_or(0.0));
-        run.to_vec()
-    });
-    first
-}
-
 /// Bends of a spring to the ground, over one deflection: those that depend on the way, and those that turn with it, over the first.
 const BENDS: [f64; 3] = [0.15, 0.5, 1.5];
 const TURNS: [f64; 6] = [-4.0, -1.5, -0.5, 0.5, 1.5, 4.0];
@@ -417,60 +295,6 @@ fn remembered(deflection: &[f64], p: f64, q: f64) -> Vec<f64> {
         out.push(z);
     }
     out.split_off(settle)
-}
-
-/// A Bouc-Wen element under a load, `load = a x + (1 - a) z`: deflection times stiffness, and its memory.
-struct BoucWen {
-    straight: f64,
-    yields: f64,
-    power: f64,
-    alike: f64,
-    x: f64,
-    z: f64,
-}
-
-impl BoucWen {
-    /// Of a shape (a, yield load, n, g, ...), new and without load.
-    fn new(shape: &[f64]) -> Self {
-        Self { straight: shape[0], yields: shape[1], power: shape[2], alike: shape[3], x: 0.0, z: 0.0 }
-    }
-
-    /// A little more load: `zd = xd (1 - |z/yield|^n (g + (1-g) sgn(xd z)))`.
-    fn load(&mut self, more: f64) {
-        let bend = if more * self.z >= 0.0 { 1.0 } else { 2.0 * self.alike - 1.0 };
-        let slope = 1.0 - (self.z.abs() / self.yields).powf(self.power) * bend;
-        let dx = more / (self.straight + (1.0 - self.straight) * slope);
-        self.x += dx;
-        self.z = (self.z + slope * dx).clamp(-self.yields, self.yields);
-    }
-}
-
-/// Share of its yield load that the memory of a new element of a shape holds under its first load.
-fn of_new(load: f64, shape: &[f64]) -> f64 {
-    let mut element = BoucWen::new(shape);
-    for _ in 0..LOADED_IN {
-        element.load(load / f64::from(LOADED_IN));
-    }
-    element.z / element.yields
-}
-
-/// Deflection times stiffness of a Bouc-Wen element of a shape under the load of a run, at the start of which its memory holds this share of
-/// its yield load.
-fn bouc_wen(load: &[f64], shape: &[f64], held: f64) -> Vec<f64> {
-    let mut element = BoucWen::new(shape);
-    let mut before = load.first().copied().unwrap_or(0.0);
-    element.z = held.clamp(-1.0, 1.0) * element.yields;
-    element.x = (before - (1.0 - element.straight) * element.z) / element.straight;
-    load.iter()
-        .map(|&now| {
-            let step = (now - before) / 8.0;
-            for _ in 0..8 {
-                element.load(step);
-            }
-            before = now;
-            element.x
-        })
-        .collect()
 }
 
 fn position(dictionary: &Dictionary, j: usize) -> Vec<f64> {

@@ -63,28 +63,25 @@ impl Search<'_, '_> {
     /// Where the free numbers of a shape should go, of their slopes. One that stands at its limit and would go beyond stays, and the others
     /// go where they should without it.
     fn moves(&self, base: &Grams, best: &Candidate, free: &[usize], slopes: &[Column]) -> Vec<f64> {
-        let mut held = vec![false; free.len()];
+        let grams = self.scorer.extended(base, &[&best.columns, slopes].concat());
+        let fixed = grams.columns() - free.len();
+        let beyond = |i: usize, by: f64| {
+            let ([low, high], here) = (best.family.limits[free[i]], best.shape[free[i]]);
+            (here <= low && by < 0.0) || (here >= high && by > 0.0)
+        };
+        let mut moving: Vec<usize> = (0..free.len()).collect();
         loop {
-            let moving: Vec<usize> = (0..free.len()).filter(|i| !held[*i]).collect();
-            let mut columns = best.columns.to_vec();
-            columns.extend(moving.iter().map(|i| slopes[*i].clone()));
-            let fit = self.scorer.fit(&self.scorer.extended(base, &columns));
-            let mut moves = vec![0.0; free.len()];
-            for (i, by) in moving.iter().zip(&fit.coefficients[fit.coefficients.len() - moving.len()..]) {
-                moves[*i] = *by;
-            }
-            let beyond = |i: &usize| {
-                let [low, high] = best.family.limits[free[*i]];
-                let here = best.shape[free[*i]];
-                (here <= low && moves[*i] < 0.0) || (here >= high && moves[*i] > 0.0)
-            };
-            let outward: Vec<usize> = moving.into_iter().filter(beyond).collect();
-            if outward.is_empty() {
+            let kept: Vec<usize> = (0..fixed).chain(moving.iter().map(|i| fixed + i)).collect();
+            let by = self.scorer.fit(&grams.only(&kept)).coefficients.split_off(fixed);
+            let (stay, go): (Vec<_>, Vec<_>) = moving.iter().copied().zip(by).partition(|(i, by)| beyond(*i, *by));
+            if stay.is_empty() {
+                let mut moves = vec![0.0; free.len()];
+                for (i, by) in go {
+                    moves[i] = by;
+                }
                 return moves;
             }
-            for i in outward {
-                held[i] = true;
-            }
+            moving = go.into_iter().map(|(i, _)| i).collect();
         }
     }
 
