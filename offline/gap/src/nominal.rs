@@ -459,6 +459,13 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
+/// Standard deviation of what scatters about 0, from the median of its size (0.6745 of one): what is rare does not count. 0 of nothing.
+pub fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).map_or(0.0, |median| median / 0.6745)
+}
+
 /// Mean.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64

@@ -74,6 +74,9 @@ pub struct Gain {
     pub error: f64,
     /// What remains without the block that says most.
     pub least: f64,
+    /// Standard errors over blocks that the squared error explained is above none. Where one block keeps more error than all others hold,
+    /// `error` is large though each of them is explained.
+    pub explained: f64,
 }
 
 impl<'a> Scorer<'a> {
@@ -283,17 +286,34 @@ impl<'a> Scorer<'a> {
                 })
                 .sum()
         };
-        let left: Vec<f64> = (0..self.problem.block_count).map(|b| total(Some(b))).collect();
+        let blocks = 0..self.problem.block_count;
+        let left: Vec<f64> = blocks.clone().map(|b| total(Some(b))).collect();
         let least = left.iter().copied().fold(f64::INFINITY, f64::min);
-        let there: Vec<f64> = left.into_iter().enumerate().filter(|(b, _)| shows(*b)).map(|(_, x)| x).collect();
-        // Of a sum over blocks; one block alone says nothing of it.
-        let blocks = there.len() as f64;
-        let mean = there.iter().sum::<f64>() / blocks.max(1.0);
-        let spread: f64 = there.iter().map(|x| (x - mean).powi(2)).sum();
+        let there = |values: &[f64]| -> Vec<f64> { blocks.clone().filter(|b| shows(*b)).map(|b| values[b]).collect() };
         let nats = total(None);
-        let error = if there.len() > 1 { (blocks / (blocks - 1.0) * spread).sqrt() } else { nats.abs() };
-        Gain { nats, error, least }
+        let error = error_of_sum(&there(&left)).unwrap_or(nats.abs());
+        let of_blocks: Vec<f64> = blocks
+            .clone()
+            .map(|b| {
+                let in_cell = |c: usize| {
+                    let noise = better.held_out[c].iter().sum::<f64>().max(1e-300);
+                    self.rows(c) / self.correlation[c] * (base.held_out[c][b] - better.held_out[c][b]) / noise
+                };
+                (0..base.held_out.len()).map(in_cell).sum()
+            })
+            .collect();
+        let of_blocks = there(&of_blocks);
+        let explained = error_of_sum(&of_blocks).map_or(1.0, |error| of_blocks.iter().sum::<f64>() / error.max(1e-300));
+        Gain { nats, error, least, explained }
     }
+}
+
+/// Standard error of a sum over blocks, from its parts or from the sums without each; one block alone says nothing of it.
+fn error_of_sum(values: &[f64]) -> Option<f64> {
+    let blocks = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / blocks.max(1.0);
+    let spread: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+    (values.len() > 1).then(|| (blocks / (blocks - 1.0) * spread).sqrt())
 }
 
 /// Are the coefficients of a candidate, the last ones of a fit, what they may be?

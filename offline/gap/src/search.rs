@@ -40,8 +40,9 @@ const EDGES: usize = 12;
 const ALWAYS: [&str; 1] = ["stribeck_friction"];
 /// What a delay in a window pays more than others, nats: a little lateness passes for the last of what a motion's middle leaves.
 const LATE_IN_A_WINDOW: f64 = 25.0;
-/// Times its standard error over the blocks that the gain of an effect has to reach,
+/// Times its standard error over the blocks that the gain of an effect has to reach, or the squared error that it explains,
 const SEEN_OFTEN: f64 = 2.0;
+const EXPLAINED_OFTEN: f64 = 3.0;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
@@ -269,12 +270,13 @@ impl Search<'_, '_> {
             if candidate.edges() > 0 {
                 let between = scorer.gain_in(&before, &after, |b| shown[b] && !edges[b]);
                 gain.error = gain.error.min(between.error);
+                gain.explained = gain.explained.max(between.explained);
             }
             if best.is_none_or(|b| gain.nats > b.nats) {
                 best = Some(gain);
             }
         }
-        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0 })
+        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0, explained: 0.0 })
     }
 
     /// Autoregression of what a set leaves, per cell.
@@ -303,7 +305,7 @@ impl Search<'_, '_> {
         let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
-            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error)
+            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || judged.gain.explained > EXPLAINED_OFTEN)
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
@@ -431,8 +433,8 @@ impl Search<'_, '_> {
             let scale = (self.scorer.gain(&base, &after).nats.max(0.0) / best.gain.nats).min(1.0);
             self.scorer.untempered();
             for scored in &mut claims {
-                scored.gain =
-                    Gain { nats: scale * scored.gain.nats, error: scale * scored.gain.error, least: scale * scored.gain.least };
+                let Gain { nats, error, least, explained } = scored.gain;
+                scored.gain = Gain { nats: scale * nats, error: scale * error, least: scale * least, explained };
                 scored.score = scored.gain.nats - price(&scored.candidate);
             }
         }

@@ -14,7 +14,7 @@ use crate::controller::Changed;
 use crate::corrected::Corrected;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
 use crate::intervals::{Edge, Estimate};
-use crate::nominal::{less_means, rms};
+use crate::nominal::{less_means, rms, robust_deviation};
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
@@ -24,18 +24,16 @@ use crate::seldom::Seldom;
 use crate::{experiment, regime};
 
 /// Noise of a cell, from how much it differs three rows apart: half of them by less than noise gives, so that effects, which
-/// change slowly or seldom, do not count (the median of |x| is 0.6745 standard deviations).
+/// change slowly or seldom, do not count.
 pub fn floor(cell: &Cell) -> f64 {
     let mut says = vec![true; cell.rows.len()];
     for &k in &cell.silent {
         says[k] = false;
     }
-    let mut steps: Vec<f64> = (3..cell.rows.len())
+    let steps = (3..cell.rows.len())
         .filter(|&k| cell.rows[k - 3].0 == cell.rows[k].0 && says[k - 3] && says[k])
-        .map(|k| (cell.residual[k] - cell.residual[k - 3]).abs())
-        .collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map_or(0.0, |median| median / 0.6745 / std::f64::consts::SQRT_2)
+        .map(|k| cell.residual[k] - cell.residual[k - 3]);
+    robust_deviation(steps) / std::f64::consts::SQRT_2
 }
 
 /// The schema's name of a channel.

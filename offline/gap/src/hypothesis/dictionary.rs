@@ -158,7 +158,8 @@ impl<'a> Dictionary<'a> {
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
     pub fn cable_load(&self, drive: usize) -> Vec<f64> {
-        self.carried(drive, |load| &load.link)
+        let beyond = self.at_grid(|r, _, k| self.problem.beyond_nominal(r, k, drive));
+        self.carried(drive, |load| &load.link).into_iter().zip(beyond).map(|(nominal, more)| nominal + more).collect()
     }
 
     /// What a drive has to give in all but dry friction, at the grid.
