@@ -35,6 +35,7 @@ pub mod needed;
 mod pictures;
 mod regime;
 pub mod seldom;
+pub mod shaking;
 mod turning;
 pub mod verdicts;
 pub mod watch;

@@ -227,12 +227,14 @@ impl Nominal {
     /// Deflection `A⁻¹ m - q` of a joint under torques of the links: they load the cables, those give way, and other joints are read through
     /// them. `shares` is [`Robot::strain_shares`].
     pub fn deflection(&self, shares: &DMatrix<f64>, joint: usize, link: &[f64]) -> f64 {
-        let n = link.len();
-        let strain = |drive: usize| {
-            let load = (0..n).map(|k| shares[(k, drive)] * link[k]).sum::<f64>();
-            self.compliance[drive][0] * load + self.compliance[drive][1]
-        };
-        (0..n).filter(|drive| shares[(joint, *drive)] != 0.0).map(|drive| shares[(joint, drive)] * strain(drive)).sum()
+        let joints = 0..link.len();
+        joints.filter(|drive| shares[(joint, *drive)] != 0.0).map(|d| shares[(joint, d)] * self.strain(shares, d, link)).sum()
+    }
+
+    /// How far the cable of a drive gives way under torques of the links.
+    pub fn strain(&self, shares: &DMatrix<f64>, drive: usize, link: &[f64]) -> f64 {
+        let load: f64 = link.iter().enumerate().map(|(k, torque)| shares[(k, drive)] * torque).sum();
+        self.compliance[drive][0] * load + self.compliance[drive][1]
     }
 
     /// What a compliance and the friction that was learnt leave of a strain, RMS.

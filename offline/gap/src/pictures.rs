@@ -101,7 +101,8 @@ fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, 
             let load = |r: usize, i: usize| {
                 let rows = &problem.pairs[r].real.rows;
                 let k = rows.partition_point(|row| *row < i).min(rows.len() - 1);
-                problem.loads[r][k].link[joint]
+                let beyond = if family.channel == Channel::Transmission { problem.shaking[r].borne(joint, k) } else { 0.0 };
+                problem.loads[r][k].link[joint] + beyond
             };
             (Quantity::new(format!("Load of {name}"), robot.effort_unit(joint)), at(&load))
         }

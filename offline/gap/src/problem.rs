@@ -6,6 +6,7 @@ use crate::motion::Motion;
 use crate::nominal::{Evaluator, Load, Nominal, robust_deviation, sign_series};
 use crate::nuisance::{Nuisance, believed, drifting};
 use crate::robot::Robot;
+use crate::shaking::Shaking;
 
 /// A residual space (gap-design.md, section 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -30,7 +31,7 @@ pub struct Cell {
     /// Recording minus simulation, N·m, N, rad or m.
     pub residual: Vec<f64>,
     /// Places of the rows that say nothing, where residual and columns are 0: a drive is held by its friction, which takes
-    /// any force below its level.
+    /// any force below its level, or elastic joints shake each other.
     pub silent: Vec<usize>,
 }
 
@@ -50,28 +51,6 @@ fn zero_at<T: Copy + Default>(series: &mut [T], places: &[usize]) {
     for &k in places {
         series[k] = T::default();
     }
-}
-
-/// Times its usual size above which the nominal model does not hold for the simulation, and rows on either side to which that reaches.
-const SHAKEN: f64 = 10.0;
-const SHAKEN_ROWS: usize = 3;
-
-/// The rows in which the model misses what the simulation itself does by far more than usually where the drive moves, and than `least`:
-/// elastic joints shake each other.
-fn shaken(missed: &[f64], held: &[bool], least: f64) -> Vec<bool> {
-    let moving = missed.iter().zip(held).filter(|(_, held)| !**held).map(|(missed, _)| *missed);
-    let limit = SHAKEN * robust_deviation(moving).max(least);
-    let mut shaken = vec![false; missed.len()];
-    for k in (0..missed.len()).filter(|k| missed[*k].abs() > limit) {
-        shaken[k.saturating_sub(SHAKEN_ROWS)..(k + SHAKEN_ROWS + 1).min(missed.len())].fill(true);
-    }
-    shaken
-}
-
-/// The rows of a pair at which a drive is held in the simulation.
-fn held_rows(pair: &Pair, sim: &Motion, drive: usize) -> Vec<bool> {
-    let held = held(sim, drive);
-    pair.real.rows.iter().map(|i| held[*i]).collect()
 }
 
 /// Share of its RMS speed below which a drive is held, and for how long it has to be, s.
@@ -145,8 +124,8 @@ pub struct Problem<'a> {
     pub block_count: usize,
     /// Nominal load at each row of the joints' cells, per run, in the order of [`Motion::rows`].
     pub loads: Vec<Vec<Load>>,
-    /// See [`Problem::beyond_nominal`]; per run, drive and row, without drives where the simulation does not tell.
-    beyond_nominal: Vec<Vec<Vec<f64>>>,
+    /// Where elastic joints shake each other, per run, at the same rows.
+    pub shaking: Vec<Shaking>,
     /// Does the tip residual start from measured joints?
     pub tip_from_truth: bool,
     /// What is known only roughly, per cell.
@@ -182,6 +161,8 @@ impl<'a> Problem<'a> {
             .iter()
             .map(|pair| pair.sim.as_ref().map(|sim| pair.real.rows.iter().map(|&i| evaluator.load(sim, i)).collect()))
             .collect();
+        let shaking =
+            pairs.iter().zip(&sim_loads).map(|(pair, loads)| Shaking::new(robot, nominal, pair, loads.as_deref())).collect();
         let tip_from_truth = pairs.iter().all(|pair| pair.real.run.truth.is_some());
         let mut problem = Self {
             robot,
@@ -191,7 +172,7 @@ impl<'a> Problem<'a> {
             blocks: Vec::new(),
             block_count: 0,
             loads,
-            beyond_nominal: vec![Vec::new(); pairs.len()],
+            shaking,
             tip_from_truth,
             nuisances: Vec::new(),
             practical: Practical::default(),
@@ -202,7 +183,6 @@ impl<'a> Problem<'a> {
         }
         if pairs.iter().all(|pair| pair.real.deflection.is_some()) {
             (0..n).for_each(|j| problem.push_transmission(j, &sim_loads));
-            problem.beyond_nominal = problem.borne_by_the_simulation(&sim_loads);
         }
         if pairs.iter().all(|pair| !pair.real.tip_rows.is_empty()) {
             problem.push_tip();
@@ -257,14 +237,8 @@ impl<'a> Problem<'a> {
             {
                 let own: Vec<f64> = pair.real.rows.iter().zip(expected(sim, loads)).map(|(&i, e)| torque[j][i] - e).collect();
                 residual.iter_mut().zip(&own).for_each(|(out, own)| *out -= own);
-                // What the model says of the robot there is no better, if its joints are seen to give way as well.
-                let elastic = self.nominal.compliance.iter().any(|cable| cable[0] > 0.0);
-                if elastic && sim.deflection.is_some() && pair.real.deflection.is_some() {
-                    let noise = robust_deviation(residual.windows(4).map(|w| w[3] - w[0])) / std::f64::consts::SQRT_2;
-                    let places =
-                        shaken(&own, &held_rows(pair, sim, j), noise).into_iter().enumerate().filter(|(_, shaken)| *shaken);
-                    cell.silent.extend(places.map(|(k, _)| first_row + k));
-                }
+                let noise = robust_deviation(residual.windows(4).map(|w| w[3] - w[0])) / std::f64::consts::SQRT_2;
+                cell.silent.extend(self.shaking[r].rows(&own, pair, j, noise).map(|k| first_row + k));
             }
             for motion in std::iter::once(&pair.real).chain(&pair.sim) {
                 for held in dry.iter().map(|(d, _)| held(motion, *d)) {
@@ -297,32 +271,6 @@ impl<'a> Problem<'a> {
             }
         }
         self.cells.push(cell);
-    }
-
-    /// What the cable of a drive bears beyond its nominal load by the simulation's own deflection, N·m or N, where elastic joints shake each
-    /// other: they accelerate in ways that no motor shows. 0 elsewhere, and where the simulation does not tell.
-    pub fn beyond_nominal(&self, run: usize, row: usize, drive: usize) -> f64 {
-        self.beyond_nominal[run].get(drive).map_or(0.0, |rows| rows[row])
-    }
-
-    fn borne_by_the_simulation(&self, sim_loads: &[Option<Vec<Load>>]) -> Vec<Vec<Vec<f64>>> {
-        let (coupling, shares) = (self.robot.coupling(), self.robot.strain_shares());
-        let n = self.robot.joint_count();
-        let of_pair = |(pair, loads): (&Pair, &Option<Vec<Load>>)| {
-            let (Some(sim), Some(loads)) = (&pair.sim, loads) else { return Vec::new() };
-            let Some(seen) = &sim.deflection else { return Vec::new() };
-            let missed = |i: usize, load: &Load, drive: usize| -> f64 {
-                (0..n).map(|j| coupling[(drive, j)] * (seen[j][i] - self.nominal.deflection(&shares, j, &load.link))).sum()
-            };
-            let of_drive = |drive: usize| -> Vec<f64> {
-                let compliance = self.nominal.compliance[drive][0];
-                let missed: Vec<f64> = pair.real.rows.iter().zip(loads).map(|(&i, load)| missed(i, load, drive)).collect();
-                let borne = |(missed, shaken): (&f64, bool)| if shaken && compliance > 0.0 { missed / compliance } else { 0.0 };
-                missed.iter().zip(shaken(&missed, &held_rows(pair, sim, drive), 0.0)).map(borne).collect()
-            };
-            (0..n).map(of_drive).collect()
-        };
-        self.pairs.iter().zip(sim_loads).map(of_pair).collect()
     }
 
     fn push_tip(&mut self) {

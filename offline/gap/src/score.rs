@@ -65,6 +65,9 @@ pub struct Fit {
     pub without: Vec<Vec<f64>>,
 }
 
+/// Blocks without which their scatter is not taken for known.
+const ENOUGH_BLOCKS: usize = 5;
+
 /// How much better one fit predicts than another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gain {
@@ -74,8 +77,8 @@ pub struct Gain {
     pub error: f64,
     /// What remains without the block that says most.
     pub least: f64,
-    /// Standard errors over blocks that the squared error explained is above none. Where one block keeps more error than all others hold,
-    /// `error` is large though each of them is explained.
+    /// Standard errors over blocks that the squared error explained is above none; 0 where too few blocks tell. Where one block keeps more
+    /// error than all others hold, `error` is large though each of them is explained.
     pub explained: f64,
 }
 
@@ -268,7 +271,7 @@ impl<'a> Scorer<'a> {
         self.gain_in(base, better, |_| true)
     }
 
-    /// The same, its error that of the blocks where the difference shows: those where it cannot say nothing of its scatter.
+    /// The same, its scatter that of the blocks where the difference shows: those where it cannot say nothing of its scatter.
     pub fn gain_in(&self, base: &Fit, better: &Fit, shows: impl Fn(usize) -> bool) -> Gain {
         let total = |skip: Option<usize>| -> f64 {
             (0..base.held_out.len())
@@ -292,18 +295,16 @@ impl<'a> Scorer<'a> {
         let there = |values: &[f64]| -> Vec<f64> { blocks.clone().filter(|b| shows(*b)).map(|b| values[b]).collect() };
         let nats = total(None);
         let error = error_of_sum(&there(&left)).unwrap_or(nats.abs());
-        let of_blocks: Vec<f64> = blocks
-            .clone()
-            .map(|b| {
-                let in_cell = |c: usize| {
-                    let noise = better.held_out[c].iter().sum::<f64>().max(1e-300);
-                    self.rows(c) / self.correlation[c] * (base.held_out[c][b] - better.held_out[c][b]) / noise
-                };
-                (0..base.held_out.len()).map(in_cell).sum()
-            })
+        let unit: Vec<f64> = (0..better.held_out.len())
+            .map(|c| self.rows(c) / self.correlation[c] / better.held_out[c].iter().sum::<f64>().max(1e-300))
             .collect();
-        let of_blocks = there(&of_blocks);
-        let explained = error_of_sum(&of_blocks).map_or(1.0, |error| of_blocks.iter().sum::<f64>() / error.max(1e-300));
+        let in_block =
+            |b: usize| unit.iter().enumerate().map(|(c, unit)| unit * (base.held_out[c][b] - better.held_out[c][b])).sum();
+        let of_blocks = there(&blocks.clone().map(in_block).collect::<Vec<f64>>());
+        let explained = match error_of_sum(&of_blocks) {
+            Some(error) if of_blocks.len() >= ENOUGH_BLOCKS => of_blocks.iter().sum::<f64>() / error.max(1e-300),
+            _ => 0.0,
+        };
         Gain { nats, error, least, explained }
     }
 }

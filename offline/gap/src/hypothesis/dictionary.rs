@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::DMatrix;
 
-use crate::nominal::Load;
 use crate::problem::{Channel, Problem};
 
 /// From when to when an effect is there, s from the start of each run; infinite where it does not begin or end in it.
@@ -158,18 +157,17 @@ impl<'a> Dictionary<'a> {
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
     pub fn cable_load(&self, drive: usize) -> Vec<f64> {
-        let beyond = self.at_grid(|r, _, k| self.problem.beyond_nominal(r, k, drive));
-        self.carried(drive, |load| &load.link).into_iter().zip(beyond).map(|(nominal, more)| nominal + more).collect()
+        let shares = self.strain_shares.column(drive);
+        self.at_grid(|r, _, k| {
+            let nominal: f64 = shares.iter().zip(&self.problem.loads[r][k].link).map(|(share, torque)| share * torque).sum();
+            nominal + self.problem.shaking[r].borne(drive, k)
+        })
     }
 
     /// What a drive has to give in all but dry friction, at the grid.
     pub fn drive_torque(&self, drive: usize) -> Vec<f64> {
-        self.carried(drive, |load| &load.motor)
-    }
-
-    fn carried(&self, drive: usize, of: impl Fn(&Load) -> &[f64]) -> Vec<f64> {
         let shares = self.strain_shares.column(drive);
-        self.at_grid(|r, _, k| shares.iter().zip(of(&self.problem.loads[r][k])).map(|(share, torque)| share * torque).sum())
+        self.at_grid(|r, _, k| shares.iter().zip(&self.problem.loads[r][k].motor).map(|(share, torque)| share * torque).sum())
     }
 
     /// Values of the grid carried over to the tip's rows: those of the nearest row.
