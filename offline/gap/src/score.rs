@@ -271,7 +271,7 @@ impl<'a> Scorer<'a> {
         self.gain_in(base, better, |_| true)
     }
 
-    /// The same, its scatter that of the blocks where the difference shows: those where it cannot say nothing of its scatter.
+    /// The same, its errors those over the blocks where the difference shows: the others say nothing of its scatter.
     pub fn gain_in(&self, base: &Fit, better: &Fit, shows: impl Fn(usize) -> bool) -> Gain {
         let total = |skip: Option<usize>| -> f64 {
             (0..base.held_out.len())
