@@ -131,7 +131,7 @@ fn main() {
                     start += columns;
                     effect.chosen.candidate.take_off(c, theta, &mut left);
                 }
-                let floor = gap::verdicts::floor(&problem.cells[c]);
+                let floor = gap::floors::floor(&problem.cells[c]);
                 let before = gap::nominal::rms(problem.cells[c].residual.iter().copied());
                 format!("{:.2}/{:.2}", before / floor, gap::nominal::rms(left.into_iter()) / floor)
             })

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::time::Instant;
 
-use gap_report::{DataQuality, Fit, Level, Pictures, Report, Space, Status};
+use gap_report::{DataQuality, Fit, FloorMethod, Level, Pictures, Report, Space, Status};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
@@ -17,7 +17,7 @@ use crate::robot::Robot;
 use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::seldom::Seldom;
-use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, known, seldom, verdicts};
+use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, seldom, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -140,6 +140,8 @@ pub struct Found<'a> {
     pub ceiling: &'a flexible::Ceiling,
     /// Noise floor of each cell, fixed before the fit.
     pub floors: &'a [f64],
+    /// How it was found.
+    pub floor_methods: &'a [FloorMethod],
     /// Likeliest values of what is known only roughly, per cell.
     pub beside: &'a [Vec<f64>],
     /// A controller that is not the simulation's.
@@ -350,15 +352,15 @@ fn analyse_with(
     if problem.cells.is_empty() {
         return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
     }
-    let floors: Vec<f64> = problem.cells.iter().map(verdicts::floor).collect();
+    let (floors, floor_methods): (Vec<f64>, Vec<FloorMethod>) = floors::floors(&problem).into_iter().unzip();
     // What the model gets wrong itself, and the forms of its own effects do, is no further effect.
     known::put_on(&mut problem, model, given, band);
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
     // Points have offset, play and coupling on every joint, and nothing else.
-    let points = train.iter().all(|pair| pair.real.run.points);
-    let thresholds = Thresholds { effects: if points { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
+    let thresholds =
+        Thresholds { effects: if problem.of_points() { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
     let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
         if options.trace {
             // Nobody may listen any more.
@@ -406,6 +408,7 @@ fn analyse_with(
         estimates: &estimates,
         ceiling: &ceiling,
         floors: &floors,
+        floor_methods: &floor_methods,
         beside: &beside,
         controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,

@@ -9,12 +9,13 @@ use simulator::model::RobotModel;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::{along_commands, along_torque};
+use crate::floors::floor;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
 use crate::problem::{Cell, Channel};
 use crate::robot::Robot;
 use crate::run::{Run, common};
-use crate::verdicts::{cell_name, cell_quantity, cell_unit, floor, main_cell};
+use crate::verdicts::{cell_name, cell_quantity, cell_unit, main_cell};
 
 /// The check under which is told what could not be simulated.
 const CHECK: &str = "simulated again";

@@ -3,9 +3,10 @@
 use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, START, Window, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parameters::{Named, parameters};
+use crate::refine;
 use crate::robot::Robot;
 use crate::score::Scorer;
-use crate::search::Effect;
+use crate::search::{Effect, score_scale};
 
 /// Parameters and window as one replicate has them.
 type Replicate = (Vec<Named>, Window);
@@ -24,14 +25,34 @@ pub struct Estimate {
     pub coefficients: Vec<f64>,
 }
 
+impl Estimate {
+    /// Intervals that hold another estimate's as well, of the numbers that both have.
+    fn widen(&mut self, other: &Self) {
+        let hold = |own: &mut [f64; 2], other: &[f64; 2]| *own = [own[0].min(other[0]), own[1].max(other[1])];
+        for (named, interval) in &mut self.parameters {
+            if let Some((_, beside)) = other.parameters.iter().find(|(beside, _)| beside.name == named.name) {
+                hold(interval, beside);
+            }
+        }
+        for (edge, beside) in self.window.iter_mut().flatten().zip(other.window.iter().flatten()) {
+            if let (Some((_, interval)), Some((_, beside))) = (edge, beside) {
+                hold(interval, beside);
+            }
+        }
+    }
+}
+
+/// How much worse, on the scale of its score, another choice may fit and is not decided against.
+const UNDECIDED: f64 = 3.0;
+
 /// Model error that blocks share and so do not show, as a share of how far a value is from no effect: forms of friction, the
 /// smoothing of a sign and of what is quick; exponents and shapes of which only some are tried; and for what is measured in units of
 /// the model's load, the weights that a lab gives its links (measured on trials whose truths were open by then).
 fn common(physics: &str, form: &str, name: &str) -> f64 {
     match (physics, name) {
-        // Of a wall's force, of exponents 1 and 1.5; its unit goes with the exponent.
-        ("external_contact", "k") => 0.8,
-        ("external_contact", "p") | ("thermal_drift", "T") => 0.5,
+        ("external_contact", "k") => 0.12,
+        ("external_contact", "p") => 0.2,
+        ("thermal_drift", "T") => 0.5,
         ("cable_hysteresis", "n" | "g") => 0.6,
         ("stribeck_friction", _) => 0.35,
         ("cable_hysteresis", "z_m") | ("load_dependent_friction" | "torque_ripple" | "thermal_drift", _) => 0.3,
@@ -110,16 +131,52 @@ enum Slope {
     Edge(usize),
 }
 
-/// Estimates of all effects together.
+/// Estimates of all effects together. Where a choice of an effect's shape is not decided, the intervals hold what either would say.
 pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, robot: &Robot, effects: &[Effect]) -> Vec<Estimate> {
-    // First round: coefficients; second: with the slopes by shape and window.
     let candidates: Vec<&Candidate> = effects.iter().map(|e| &e.chosen.candidate).collect();
+    let mut all = of_candidates(dictionary, scorer, nominal, robot, &candidates);
+    for (k, estimate) in all.iter_mut().enumerate() {
+        for other in chosen_as_well(dictionary, scorer, &candidates, (k, effects[k].chosen.score)) {
+            let mut with = candidates.clone();
+            with[k] = &other;
+            estimate.widen(&of_candidates(dictionary, scorer, nominal, robot, &with)[k]);
+        }
+    }
+    all
+}
+
+/// A candidate among others with its other choices, where these do not fit much worse.
+fn chosen_as_well(dictionary: &Dictionary, scorer: &Scorer, candidates: &[&Candidate], (k, score): (usize, f64)) -> Vec<Candidate> {
+    if candidates[k].family.choices.is_empty() {
+        return Vec::new();
+    }
+    let others = candidates.iter().enumerate().filter(|(i, _)| *i != k);
+    let base = others.fold(scorer.empty(), |grams, (_, other)| scorer.extended(&grams, &other.columns));
+    let fitted = |candidate: &Candidate| scorer.fitted(&base, candidate);
+    let least = fitted(candidates[k]).0;
+    if !least.is_finite() {
+        return Vec::new();
+    }
+    let mut all = refine::chosen_otherwise(dictionary, candidates[k], &fitted);
+    all.retain(|other| fitted(other).0 < least + UNDECIDED * score_scale(score));
+    all
+}
+
+/// Estimates of candidates together.
+fn of_candidates(
+    dictionary: &Dictionary,
+    scorer: &Scorer,
+    nominal: &Nominal,
+    robot: &Robot,
+    candidates: &[&Candidate],
+) -> Vec<Estimate> {
+    // First round: coefficients; second: with the slopes by shape and window.
     let plain = candidates.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
     let fit = scorer.fit(&plain);
     let mut grams = scorer.empty();
     let mut layout = Vec::new();
     let (mut start, mut column) = (0, 0);
-    for candidate in &candidates {
+    for candidate in candidates {
         let theta = &fit.coefficients[start..start + candidate.columns.len()];
         start += theta.len();
         let slopes = slopes(dictionary, candidate, theta);

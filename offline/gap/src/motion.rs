@@ -219,6 +219,7 @@ mod tests {
             id: String::new(),
             start_s: 0.0,
             since_s: 0.0,
+            past: crate::past::Past::default(),
             dt_s: 0.001,
             points: false,
             position: vec![series.clone()],

@@ -468,6 +468,13 @@ pub fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
     sizes.get(sizes.len() / 2).map_or(0.0, |median| median / 0.6745)
 }
 
+/// Noise of a series, from how much it differs three rows apart, where these may be compared: half of them by less than noise gives, so that
+/// effects, which change slowly or seldom, do not count.
+pub fn noise_of(series: &[f64], comparable: impl Fn(usize, usize) -> bool) -> f64 {
+    let steps = (3..series.len()).filter(|&k| comparable(k - 3, k)).map(|k| series[k] - series[k - 3]);
+    robust_deviation(steps) / std::f64::consts::SQRT_2
+}
+
 /// Mean.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64

@@ -3,7 +3,7 @@
 use arm::serial::Workspace;
 
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, Load, Nominal, robust_deviation, sign_series};
+use crate::nominal::{Evaluator, Load, Nominal, noise_of, sign_series};
 use crate::nuisance::{Nuisance, believed, drifting};
 use crate::robot::Robot;
 use crate::shaking::Shaking;
@@ -215,6 +215,11 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// Are its rows points without a clock?
+    pub(crate) fn of_points(&self) -> bool {
+        self.pairs.iter().all(|pair| pair.real.run.points)
+    }
+
     fn push_torque(&mut self, j: usize, sim_loads: &[Option<Vec<Load>>]) {
         let coupling = self.robot.coupling();
         let dry: Vec<(usize, f64)> = (0..self.robot.joint_count())
@@ -237,7 +242,7 @@ impl<'a> Problem<'a> {
             {
                 let own: Vec<f64> = pair.real.rows.iter().zip(expected(sim, loads)).map(|(&i, e)| torque[j][i] - e).collect();
                 residual.iter_mut().zip(&own).for_each(|(out, own)| *out -= own);
-                let noise = robust_deviation(residual.windows(4).map(|w| w[3] - w[0])) / std::f64::consts::SQRT_2;
+                let noise = noise_of(&residual, |_, _| true);
                 cell.silent.extend(self.shaking[r].rows(&own, pair, j, noise).map(|k| first_row + k));
             }
             for motion in std::iter::once(&pair.real).chain(&pair.sim) {

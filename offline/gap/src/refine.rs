@@ -13,8 +13,10 @@ const EDGE_S: f64 = 0.1;
 /// The same of a memory of the whole motion.
 const SHARP_ROUNDS: usize = 10;
 /// Rounds over all numbers of a shape, at most, and over those of which one makes up for another: how slow, and since when.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 6;
 const ROUNDS_IN_VALLEYS: usize = 12;
+/// How often choices are made anew.
+const CHOICES: usize = 4;
 
 /// Every family at every point of its grid.
 pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidate> {
@@ -35,8 +37,39 @@ pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidat
 /// Misfit of a candidate and its coefficients; infinite where they may not be.
 pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + 'a;
 
-/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least.
+/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least, and with the choice
+/// that is best then.
 pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
+    let mut best = settled(dictionary, start, fitted);
+    if start.family.choices.is_empty() {
+        return best;
+    }
+    let mut least = fitted(&best).0;
+    // Each begins where the other came to rest.
+    for _ in 0..CHOICES {
+        let others = chosen_otherwise(dictionary, &best, fitted).into_iter().map(|other| (fitted(&other).0, other));
+        match others.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((misfit, other)) if misfit < least => (least, best) = (misfit, other),
+            _ => break,
+        }
+    }
+    best
+}
+
+/// A settled candidate with each other choice that its family has, settled again.
+pub fn chosen_otherwise(dictionary: &Dictionary, of: &Candidate, fitted: &Fitted) -> Vec<Candidate> {
+    let family = &of.family;
+    let with = |k: usize, value: f64| {
+        let mut shape = of.shape.clone();
+        shape[k] = value;
+        Candidate::new(dictionary, family, &shape, of.window)
+    };
+    let all = family.choices.iter().flat_map(|&k| family.other_choices(k, of.shape[k]).into_iter().map(move |value| (k, value)));
+    all.map(|(k, value)| with(k, value)).filter(Candidate::shows).map(|start| settled(dictionary, &start, fitted)).collect()
+}
+
+/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least.
+fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
     let misfit = &|candidate: &Candidate| fitted(candidate).0;
     let family = &start.family;
     let mut best = start.clone();

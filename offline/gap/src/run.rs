@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use recordings::Recording;
 
 use crate::nominal::{mean, rms};
+use crate::past::Past;
 use crate::robot::Robot;
 use crate::saturation::{self, Saturated};
 
@@ -118,6 +119,8 @@ pub struct Run {
     pub start_s: f64,
     /// Its first sample from the start of the run of which it is a part, s; 0 of a whole run.
     pub since_s: f64,
+    /// Where joints and drives turned before that.
+    pub past: Past,
     /// Sample period, s; 1 of points.
     pub dt_s: f64,
     /// Are the samples points without a clock, at each of which the robot stood?
@@ -297,6 +300,7 @@ impl Run {
             id: run,
             start_s: clock.start_s,
             since_s: 0.0,
+            past: Past::default(),
             dt_s: clock.dt_s,
             mask: limited.1,
             points: clock.points,
@@ -384,6 +388,16 @@ impl Run {
         }
     }
 
+    /// A drive's positions, and where it turned before.
+    pub(crate) fn drive_and_past(&self, j: usize) -> [&[f64]; 2] {
+        [self.past.drive.get(j).map_or(&[], Vec::as_slice), &self.drive[j]]
+    }
+
+    /// The same of a joint.
+    pub(crate) fn position_and_past(&self, j: usize) -> [&[f64]; 2] {
+        [self.past.position.get(j).map_or(&[], Vec::as_slice), &self.position[j]]
+    }
+
     /// The same at other times: samples `dt_s` apart from `start_s` on, `count` of them, all within the run.
     fn at(&self, start_s: f64, dt_s: f64, count: usize) -> Self {
         let first = (start_s - self.start_s) / self.dt_s;
@@ -414,6 +428,7 @@ impl Run {
             id: self.id.clone(),
             start_s,
             since_s: 0.0,
+            past: self.past.clone(),
             dt_s,
             points: self.points,
             position: set(&self.position),
@@ -437,6 +452,7 @@ impl Run {
             id: self.id.clone(),
             start_s: self.time_s(from),
             since_s: self.since_s + from as f64 * self.dt_s,
+            past: if from == 0 { self.past.clone() } else { self.past.until(&self.position, &self.drive, from) },
             dt_s: self.dt_s,
             points: self.points,
             position: cut(&self.position),

@@ -256,6 +256,13 @@ impl<'a> Scorer<'a> {
         fit.within.iter().enumerate().map(|(c, sum)| 0.5 * self.rows(c) / self.correlation[c] * sum.max(1e-300).ln()).sum()
     }
 
+    /// Misfit of a candidate beside the rest, infinite where its coefficients may not be, and these.
+    pub fn fitted(&self, base: &Grams, candidate: &Candidate) -> (f64, Vec<f64>) {
+        let fit = self.fit(&self.extended(base, &candidate.columns));
+        let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
+        (if within_bounds(candidate, &fit) { self.misfit(&fit) } else { f64::INFINITY }, own)
+    }
+
     fn rows(&self, cell: usize) -> f64 {
         self.whitened[cell].len() as f64
     }

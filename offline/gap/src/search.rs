@@ -1,15 +1,17 @@
 //! Which candidates explain the residuals: forward, then swap and drop (gap-design.md, section 7).
 
 mod at_once;
+mod likeliest;
 
 use std::sync::Arc;
 
-use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
-use crate::linear::dot;
+pub(crate) use likeliest::{complexity, likelihood, score_scale};
+use likeliest::{likeliest_first, simpler_is_enough};
+
+use crate::hypothesis::{Candidate, Dictionary, Family, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
-use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -22,7 +24,7 @@ pub struct Thresholds {
     /// Least RMS of a further effect, of the largest effect's in some cell where it helps: what is smaller may be the
     /// larger one's model error.
     pub amplitude: f64,
-    /// Claims whose scores differ by less than this share are equal: the simpler one is taken.
+    /// Claims whose scores differ by less than this share are equal: the likeliest one is taken, which is mostly the simplest.
     pub equal: f64,
     /// Most effects.
     pub effects: usize,
@@ -59,8 +61,6 @@ const CLAIMS_IN_WINDOWS: usize = 14;
 /// Forms that are tried in the window of the best claim, between the grid's points: their number, and the share of its score.
 const FORMS_IN_WINDOW: usize = 8;
 const NEAR_IN_WINDOW: f64 = 0.5;
-/// Share of a claim's score by which a form of more numbers has to be better than a simpler one.
-const SAME_FORM: f64 = 0.01;
 
 /// Share of the best claim's score from which on a rival begins again with its rounding.
 const ROUNDED: f64 = 0.2;
@@ -224,7 +224,7 @@ impl Search<'_, '_> {
         for candidate in others.iter().chain([&scored.candidate]) {
             let theta = &after.coefficients[start..start + candidate.columns.len()];
             start += theta.len();
-            sizes.push((0..shares.len()).map(|c| candidate.rms(c, theta)).collect());
+            sizes.push((0..shares.len()).map(|c| candidate.varies_by(c, theta)).collect());
         }
         let own = sizes.pop().unwrap_or_default();
         let amplitude = (0..shares.len())
@@ -305,7 +305,7 @@ impl Search<'_, '_> {
         let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
-            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || judged.gain.explained > EXPLAINED_OFTEN)
+            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || is_uneven(&judged.gain))
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
@@ -325,14 +325,7 @@ impl Search<'_, '_> {
         if !candidate.family.limits.is_empty() {
             return self.refined_at_once(base, candidate);
         }
-        refined(self.dictionary, candidate, &|candidate| self.fitted(base, candidate))
-    }
-
-    /// Misfit of a candidate beside the rest, infinite where its coefficients may not be, and these.
-    fn fitted(&self, base: &Grams, candidate: &Candidate) -> (f64, Vec<f64>) {
-        let fit = self.scorer.fit(&self.scorer.extended(base, &candidate.columns));
-        let own = fit.coefficients[fit.coefficients.len() - candidate.columns.len()..].to_vec();
-        (if within_bounds(candidate, &fit) { self.scorer.misfit(&fit) } else { f64::INFINITY }, own)
+        refined(self.dictionary, candidate, &|candidate| self.scorer.fitted(base, candidate))
     }
 
     /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
@@ -440,7 +433,7 @@ impl Search<'_, '_> {
         }
         sort(&mut claims);
         self.told_apart(others, &mut claims);
-        parsimonious(&mut claims, self.thresholds.equal, self.problem.robot);
+        likeliest_first(&mut claims, self.thresholds.equal, self.problem.robot);
         claims
     }
 
@@ -603,87 +596,9 @@ fn price(candidate: &Candidate) -> f64 {
     candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
 }
 
-/// Claims that hold another one and more, in these forms (all, where none is named), and the share of its score by which they
-/// have to be better.
-const HOLDS: [(&str, &[&str], &str, f64); 4] = [
-    ("link_inertia", &[], "payload", 0.03),
-    (UNMODELLED, &HARDENING, "cable_stretch", 0.02),
-    ("cable_hysteresis", &[], "cable_stretch", 0.01),
-    // A drift that has come to its end before it is there is an offset; a cable that slips takes a moment to settle.
-    ("thermal_drift", &["position"], "joint_offset", 0.05),
-];
-
-/// The share by which a claim has to be better than one that it holds; none where it holds it not.
-fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
-    // A payload hangs on the last link, unless a site says otherwise.
-    let place = |candidate: &Candidate| match candidate.family.joints.as_slice() {
-        [] => vec![candidate.shape_of("link").map_or(last_link, |link| link as usize)],
-        joints => joints.to_vec(),
-    };
-    let holds = |(larger, forms, smaller, _): &(&str, &[&str], &str, f64)| {
-        (one.family.physics, other.family.physics) == (*larger, *smaller) && (forms.is_empty() || forms.contains(&one.family.form))
-    };
-    let (.., share) = HOLDS.into_iter().find(holds)?;
-    (place(one) == place(other)).then_some(share)
-}
-
-/// Share of an effect by which a loop has to differ from a straight line: the load that is believed is off by as much.
-const OFF_THE_LINE: f64 = 0.1;
-/// Share of its score that a straight line may then be behind.
-const ON_THE_LINE: f64 = 0.3;
-
-/// Is a loop that the best claim says, up to what the load is known by, the straight line that the other one says?
-fn is_straight(best: &Scored, line: &Scored) -> bool {
-    let physics = |scored: &Scored| scored.candidate.family.physics;
-    if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.window != line.candidate.window {
-        return false;
-    }
-    let effect = |scored: &Scored, cell: usize| scored.candidate.effect(cell, &scored.coefficients);
-    line.candidate.columns.iter().flat_map(|column| &column.parts).all(|(cell, _)| {
-        let (loops, straight) = (effect(best, *cell), effect(line, *cell));
-        let overlap = dot(&loops, &straight).powi(2) / (dot(&loops, &loops) * dot(&straight, &straight)).max(1e-300);
-        loops.len() == straight.len() && overlap > 1.0 - OFF_THE_LINE * OFF_THE_LINE
-    })
-}
-
-/// Brings the simplest of those that are as good as the best to the front.
-fn parsimonious(claims: &mut [Scored], equal: f64, robot: &Robot) {
-    let last_link = robot.joint_count() - 1;
-    let Some(best) = claims.first() else { return };
-    let good = |best: &Scored, claim: &Scored| {
-        let held = held(&best.candidate, &claim.candidate, last_link);
-        let share =
-            if held.is_some() && robot.simulates_itself && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
-        claim.score >= best.score - (share * best.score.abs()).max(3.0)
-    };
-    let simplest = (0..claims.len())
-        .filter(|k| good(best, &claims[*k]))
-        .min_by(|a, b| complexity(&claims[*a].candidate).total_cmp(&complexity(&claims[*b].candidate)));
-    if let Some(k) = simplest {
-        claims[..=k].rotate_right(1);
-    }
-    // Of what was taken for simpler, the part may be enough.
-    let Some(part) = claims.iter().position(|c| held(&claims[0].candidate, &c.candidate, last_link).is_some()) else { return };
-    if good(&claims[0], &claims[part]) {
-        claims[..=part].rotate_right(1);
-    }
-}
-
-/// Numbers that a candidate fits, and between equals what is less usual.
-pub(crate) fn complexity(candidate: &Candidate) -> f64 {
-    let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
-    // What rounds a sign is not a claim of its own.
-    let rounding = candidate.family.shape.iter().filter(|name| rounds(name)).count();
-    (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
-}
-
-/// Is there a form of the same claim that fits fewer numbers and does as well?
-fn simpler_is_enough<'s>(form: &Scored, all: impl IntoIterator<Item = &'s Scored>) -> bool {
-    all.into_iter().any(|other| {
-        other.candidate.same_claim(&form.candidate)
-            && complexity(&other.candidate) < complexity(&form.candidate)
-            && other.score >= (1.0 - SAME_FORM) * form.score
-    })
+/// Is an effect accepted for what each block explains, though its gain is that of a few?
+pub(crate) fn is_uneven(gain: &Gain) -> bool {
+    gain.nats <= SEEN_OFTEN * gain.error && gain.explained > EXPLAINED_OFTEN
 }
 
 fn sort(all: &mut [Scored]) {

@@ -4,9 +4,9 @@ use std::time::{Instant, SystemTime};
 
 use gap_report::{
     Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature,
-    Fit as FitFigure, FloorMethod, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures,
-    Regime, Remaining, Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod,
-    Timing, Tool, Verdict, ranked, timestamp,
+    Fit as FitFigure, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining,
+    Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict,
+    ranked, timestamp,
 };
 
 use crate::analysis::{Found, Given, Options, Outcome};
@@ -14,27 +14,14 @@ use crate::controller::Changed;
 use crate::corrected::Corrected;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
 use crate::intervals::{Edge, Estimate};
-use crate::nominal::{less_means, rms, robust_deviation};
+use crate::nominal::{less_means, rms};
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
-use crate::search::{Effect, Scored, complexity};
+use crate::search::{Effect, Scored, complexity, is_uneven, likelihood, score_scale};
 use crate::seldom::Seldom;
 use crate::{experiment, regime};
-
-/// Noise of a cell, from how much it differs three rows apart: half of them by less than noise gives, so that effects, which
-/// change slowly or seldom, do not count.
-pub fn floor(cell: &Cell) -> f64 {
-    let mut says = vec![true; cell.rows.len()];
-    for &k in &cell.silent {
-        says[k] = false;
-    }
-    let steps = (3..cell.rows.len())
-        .filter(|&k| cell.rows[k - 3].0 == cell.rows[k].0 && says[k - 3] && says[k])
-        .map(|k| cell.residual[k] - cell.residual[k - 3]);
-    robust_deviation(steps) / std::f64::consts::SQRT_2
-}
 
 /// The schema's name of a channel.
 pub(crate) fn told(channel: Channel) -> Told {
@@ -249,25 +236,18 @@ fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, data
     }
 }
 
-/// Weight of a claim that scores so much less than the best: structural error makes the scale of the scores a share of them.
-fn weight(best: f64, score: f64) -> f64 {
-    ((score - best) / (2.0_f64).max(0.01 * best)).exp()
-}
-
-/// What each number that a rival fits beyond the claim's own takes off its weight, nats: of claims that predict alike the
-/// simplest was right so much more often (docs/proof.md, stated and observed probability).
-const NATS_PER_NUMBER: f64 = 1.5;
-
-/// Weight of a rival beside the claim that was chosen, whose own is 1.
+/// Weight of a rival beside the claim that was chosen, whose own is 1. A larger claim that holds the chosen one, and had to be better by more
+/// than it is, is not the likelier one.
 fn weight_beside(chosen: &Scored, rival: &Scored) -> f64 {
     let more = (complexity(&rival.candidate) - complexity(&chosen.candidate)).max(0.0);
-    weight(chosen.score, rival.score) * (-NATS_PER_NUMBER * more).exp()
+    likelihood(rival.score, chosen.score, more).exp().min(1.0)
 }
 
 /// Weight of an effect, of its rivals and of none of them together.
 fn total_weight(effect: &Effect) -> f64 {
     let chosen = &effect.chosen;
-    1.0 + effect.rivals.iter().map(|r| weight_beside(chosen, r)).sum::<f64>() + weight(chosen.score, 0.0)
+    let none = (-chosen.score / score_scale(chosen.score)).exp();
+    1.0 + effect.rivals.iter().map(|r| weight_beside(chosen, r)).sum::<f64>() + none
 }
 
 /// The primary verdict of an effect and its alternatives.
@@ -293,6 +273,15 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let mut evidence =
         Evidence::new("held-out gain over all other effects", claim, (effect.gain.nats, "nats"), TestMethod::HeldOutGain);
     evidence.effect = None;
+    let uneven = is_uneven(&effect.gain).then(|| {
+        let claim = "its gain comes from a few blocks; how much of the squared error it explains, block by block, over the standard error of that";
+        Evidence::new(
+            "squared error explained, block by block",
+            claim,
+            (effect.gain.explained, "standard errors"),
+            TestMethod::HeldOutGain,
+        )
+    });
     let size = crate::parameters::beside(found.robot, found.nominal, candidate, &estimate.coefficients);
     let size =
         size.map(|(name, value, unit)| Evidence::new(name, format!("{value:.3e} {unit}"), (value, unit), TestMethod::HeldOutGain));
@@ -301,7 +290,7 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
         physics.clone(),
         probability,
         location.clone(),
-        (told_parameters(found, candidate, estimate), fit, std::iter::once(evidence).chain(size).collect()),
+        (told_parameters(found, candidate, estimate), fit, std::iter::once(evidence).chain(uneven).chain(size).collect()),
         artifact,
     );
     verdict.score = Some(score);
@@ -496,7 +485,7 @@ fn fits(found: &Found, candidate: &Candidate, theta: &[f64]) -> Vec<FitFigure> {
     let of = &found.problem.cells[cell];
     let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
     let pair = (rms(before.into_iter()), rms(after.into_iter()));
-    let floor = Some((found.floors[cell], FloorMethod::Innovations));
+    let floor = Some((found.floors[cell], found.floor_methods[cell]));
     vec![FitFigure::rms(
         cell_quantity(found.robot, of),
         cell_unit(found.robot, of),

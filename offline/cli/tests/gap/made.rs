@@ -128,6 +128,21 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
 }
 
 #[test]
+fn a_wall_has_the_exponent_that_fits_once_it_is_in_place() {
+    // The grid's walls are too far apart to tell: of these the exponents came out the other way round, and stiffnesses by the unit that goes with them.
+    for (seed, id, stiffness, exponent) in
+        [(3_848_609_202, "5f5e6e7b21ab", 4554.5, 1.5), (3_282_418_269, "7ccc9963eb98", 242.97, 1.0)]
+    {
+        let (report, _) = of_matrix("full", seed, id);
+        let first = primary(&report)[0];
+        assert_eq!(first.physics.to_string(), "external_contact", "{}", report.summary);
+        holds(first, "k", stiffness, 0.1);
+        let (power, [low, high]) = parameter(first, "p");
+        assert!((power - exponent).abs() < 1e-9 && high - low < 1.0, "{power} ({low} to {high})");
+    }
+}
+
+#[test]
 fn hysteresis_as_large_as_the_noise_is_told_from_a_zero_that_is_off() {
     // Under a weight of one sign most of it is constant. Loading and unloading bend nearly alike in the second.
     for (g, label) in [(0.55, "bent-1"), (0.8, "bent-2")] {

@@ -157,17 +157,17 @@ impl<'a> Dictionary<'a> {
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
     pub fn cable_load(&self, drive: usize) -> Vec<f64> {
-        let shares = self.strain_shares.column(drive);
-        self.at_grid(|r, _, k| {
-            let nominal: f64 = shares.iter().zip(&self.problem.loads[r][k].link).map(|(share, torque)| share * torque).sum();
-            nominal + self.problem.shaking[r].borne(drive, k)
-        })
+        self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].link) + self.problem.shaking[r].borne(drive, k))
     }
 
     /// What a drive has to give in all but dry friction, at the grid.
     pub fn drive_torque(&self, drive: usize) -> Vec<f64> {
-        let shares = self.strain_shares.column(drive);
-        self.at_grid(|r, _, k| shares.iter().zip(&self.problem.loads[r][k].motor).map(|(share, torque)| share * torque).sum())
+        self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].motor))
+    }
+
+    /// What torques at the joints ask of the cable of a drive.
+    fn carried(&self, drive: usize, torques: &[f64]) -> f64 {
+        self.strain_shares.column(drive).iter().zip(torques).map(|(share, torque)| share * torque).sum()
     }
 
     /// Values of the grid carried over to the tip's rows: those of the nearest row.

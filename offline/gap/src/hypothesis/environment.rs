@@ -79,6 +79,7 @@ fn wall(tips: &Arc<Tips>) -> Family {
     let family = Family::shaped("external_contact", &[], WALL, Channel::JointTorque, &[Bound::Positive], &shape, grid, columns);
     family
         .stepped(&[Some(0.1 * reach), None, Some(TURN), Some(TURN)])
+        .choosing(&[1])
         // A wall that turns is still as deep as it was where the tip goes deepest.
         .carrying(move |before, after| {
             let deepest = |s: &[f64]| own.range(&direction(s[2], s[3])).1;

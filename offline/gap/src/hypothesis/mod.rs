@@ -68,8 +68,12 @@ pub struct Family {
     /// First step of the numbers that are refined between the grid's; none for those that are choices. NaN: half the
     /// distance to the grid's next.
     pub steps: Vec<Option<f64>>,
+    /// The choices among them that are made anew once the others are settled: on the grid the others are too coarse to decide.
+    pub choices: Vec<usize>,
     /// Between which values the numbers of its shape lie; none: each number is searched for itself, wherever it leads.
     pub limits: Vec<[f64; 2]>,
+    /// Has it a constant of its own, which does not count for how large it is?
+    pub with_constant: bool,
     /// Are the columns secants from 0 to the shape, so that the fit's own first coefficients are the next shape?
     pub secant: bool,
     /// One per coefficient.
@@ -111,7 +115,9 @@ impl Family {
             shape: Vec::new(),
             grid: vec![Vec::new()],
             steps: Vec::new(),
+            choices: Vec::new(),
             limits: Vec::new(),
+            with_constant: false,
             secant: false,
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
@@ -142,7 +148,9 @@ impl Family {
             channel,
             shape: shape.iter().map(|s| s.0).collect(),
             steps: shape.iter().map(|s| s.1.then_some(f64::NAN)).collect(),
+            choices: Vec::new(),
             limits: Vec::new(),
+            with_constant: false,
             secant: false,
             grid,
             bounds: bounds.to_vec(),
@@ -177,10 +185,32 @@ impl Family {
         self
     }
 
+    /// With numbers of its shape, refined by none, that are chosen anew once the others are; of families without limits.
+    #[must_use]
+    pub fn choosing(mut self, choices: &[usize]) -> Self {
+        self.choices = choices.to_vec();
+        self
+    }
+
+    /// What a choice of its shape may be instead, at the grid's values.
+    pub fn other_choices(&self, k: usize, here: f64) -> Vec<f64> {
+        let mut all: Vec<f64> = self.grid.iter().map(|point| point[k]).filter(|value| *value != here).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+
     /// With limits of its numbers, which then are refined all at once.
     #[must_use]
     pub fn limited(mut self, limits: &[[f64; 2]]) -> Self {
         self.limits = limits.to_vec();
+        self
+    }
+
+    /// With a constant of its own.
+    #[must_use]
+    pub fn about_a_constant(mut self) -> Self {
+        self.with_constant = true;
         self
     }
 
@@ -285,6 +315,13 @@ impl Candidate {
     /// Takes the effect in a cell off a series.
     pub fn take_off(&self, cell: usize, coefficients: &[f64], series: &mut [f64]) {
         series.iter_mut().zip(self.effect(cell, coefficients)).for_each(|(y, p)| *y -= p);
+    }
+
+    /// RMS of the effect in a cell, about its mean where that is a constant of its own.
+    pub fn varies_by(&self, cell: usize, coefficients: &[f64]) -> f64 {
+        let effect = self.effect(cell, coefficients);
+        let mean = if self.family.with_constant { crate::nominal::mean(&effect) } else { 0.0 };
+        crate::nominal::rms(effect.into_iter().map(|x| x - mean))
     }
 
     /// RMS of the effect in a cell for given coefficients.

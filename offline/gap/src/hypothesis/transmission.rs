@@ -67,7 +67,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         &[Bound::Between(0.7, 1.4)],
         &[("b", true)],
         product(&[&PLAY.map(|share| share * travel)]),
-        move |d, s| vec![d.strain_of(j, lag(d, s[0], &|run| &run.drive[j]))],
+        move |d, s| vec![d.strain_of(j, lag(d, s[0], &|run| run.drive_and_past(j)))],
     ));
     // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
     if size(&dictionary.cable_load(j)) < 1e-9 {
@@ -81,12 +81,12 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             move |d| {
                 widths
                     .iter()
-                    .map(|width| d.strain_of(j, lag(d, *width, &|run| &run.drive[j])))
+                    .map(|width| d.strain_of(j, lag(d, *width, &|run| run.drive_and_past(j))))
                     .chain([d.deflection_of(j, minus(&position(d, j))), offset(d, j)])
                     .collect()
             },
         );
-        all.push(family.penalised(3.0));
+        all.push(family.about_a_constant().penalised(3.0));
     }
     let usual = size(&dictionary.cable_load(j)).max(1e-9);
     // A damped link takes its time from one side to the other: the impulse of its load that carries it across is the shape.
@@ -139,17 +139,18 @@ fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
 }
 
 /// How far what is moved through a play lags behind what moves it.
-fn lag(dictionary: &Dictionary, width: f64, moves: &dyn Fn(&Run) -> &[f64]) -> Vec<f64> {
+fn lag(dictionary: &Dictionary, width: f64, moves: &dyn Fn(&Run) -> [&[f64]; 2]) -> Vec<f64> {
     dictionary.smoothed(|r| {
-        let series = moves(&dictionary.problem.pairs[r].real.run);
-        let mut inner = series[0];
-        series
-            .iter()
-            .map(|x| {
-                inner = f64::clamp(inner, x - 0.5 * width, x + 0.5 * width);
-                x - inner
-            })
-            .collect()
+        let [past, series] = moves(&dictionary.problem.pairs[r].real.run);
+        let mut inner = past.first().unwrap_or(&series[0]).to_owned();
+        let mut follow = |x: &f64| {
+            inner = f64::clamp(inner, x - 0.5 * width, x + 0.5 * width);
+            x - inner
+        };
+        past.iter().for_each(|x| {
+            follow(x);
+        });
+        series.iter().map(follow).collect()
     })
 }
 
@@ -351,7 +352,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     );
     let travel = dictionary.travel(j);
     // A bend in points that a camera saw is mostly play or the camera.
-    let unlikely = if dictionary.problem.pairs.iter().all(|pair| pair.real.run.points) { 12.0 } else { 0.0 };
+    let unlikely = if dictionary.problem.of_points() { 12.0 } else { 0.0 };
     let periods = periods(travel, dictionary.problem.robot.range(j));
     for (form, carries) in [("once per turn", false), ("once per turn, torque too", true)] {
         all.push(
@@ -411,10 +412,10 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             let mut bounds = vec![small];
             bounds.resize(2 + widths.len(), Bound::Free);
             let family = Family::fixed("joint_coupling", &pair, LATE_COUPLING, TRANSMISSION, &bounds, move |d| {
-                let late = widths.iter().map(|width| d.strain_of(j, lag(d, *width, &|run| &run.position[i])));
+                let late = widths.iter().map(|width| d.strain_of(j, lag(d, *width, &|run| run.position_and_past(i))));
                 std::iter::once(coupled(d)).chain(late).chain([offset(d, j)]).collect()
             });
-            all.push(family.penalised(4.0));
+            all.push(family.about_a_constant().penalised(4.0));
         }
         all.push(
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {

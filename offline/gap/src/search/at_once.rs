@@ -20,8 +20,8 @@ impl Search<'_, '_> {
         let mut best = start.clone();
         self.descend(base, &mut best);
         if best.edges() > 0 {
-            let (mut least, _) = self.fitted(base, &best);
-            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| self.fitted(base, candidate).0);
+            let (mut least, _) = self.scorer.fitted(base, &best);
+            edges_moved(self.dictionary, &mut best, &mut least, &|candidate| self.scorer.fitted(base, candidate).0);
             self.descend(base, &mut best);
         }
         best
@@ -32,7 +32,7 @@ impl Search<'_, '_> {
         let family = best.family.clone();
         let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
-        let (mut least, mut theta) = self.fitted(base, best);
+        let (mut least, mut theta) = self.scorer.fitted(base, best);
         for _ in 0..STEPS {
             let moves = self.moves(base, best, &free, &slopes_of(self.dictionary, best, &theta, &free));
             // No further at once than a third of what a number can be.
@@ -48,7 +48,7 @@ impl Search<'_, '_> {
                     shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
                 }
                 let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
-                let (misfit, own) = if candidate.shows() { self.fitted(base, &candidate) } else { return None };
+                let (misfit, own) = if candidate.shows() { self.scorer.fitted(base, &candidate) } else { return None };
                 (misfit < least).then_some((candidate, misfit, own))
             });
             let Some((candidate, misfit, own)) = there else { return };

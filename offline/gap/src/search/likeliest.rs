@@ -1,0 +1,113 @@
+//! Which of the claims that predict about alike is taken: the likeliest, which is mostly the simplest.
+
+use super::Scored;
+use crate::hypothesis::{Candidate, HARDENING, UNMODELLED, rounds};
+use crate::linear::dot;
+use crate::robot::Robot;
+
+/// Claims that hold another one and more, in these forms (all, where none is named), and the share of its score by which they
+/// have to be better.
+const HOLDS: [(&str, &[&str], &str, f64); 4] = [
+    ("link_inertia", &[], "payload", 0.03),
+    (UNMODELLED, &HARDENING, "cable_stretch", 0.02),
+    ("cable_hysteresis", &[], "cable_stretch", 0.01),
+    // A drift that has come to its end before it is there is an offset; a cable that slips takes a moment to settle.
+    ("thermal_drift", &["position"], "joint_offset", 0.05),
+];
+
+/// The share by which a claim has to be better than one that it holds; none where it holds it not.
+fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
+    // A payload hangs on the last link, unless a site says otherwise.
+    let place = |candidate: &Candidate| match candidate.family.joints.as_slice() {
+        [] => vec![candidate.shape_of("link").map_or(last_link, |link| link as usize)],
+        joints => joints.to_vec(),
+    };
+    let holds = |(larger, forms, smaller, _): &(&str, &[&str], &str, f64)| {
+        (one.family.physics, other.family.physics) == (*larger, *smaller) && (forms.is_empty() || forms.contains(&one.family.form))
+    };
+    let (.., share) = HOLDS.into_iter().find(holds)?;
+    (place(one) == place(other)).then_some(share)
+}
+
+/// Share of an effect by which a loop has to differ from a straight line: the load that is believed is off by as much.
+const OFF_THE_LINE: f64 = 0.1;
+/// Share of its score that a straight line may then be behind.
+const ON_THE_LINE: f64 = 0.3;
+
+/// Is a loop that the best claim says, up to what the load is known by, the straight line that the other one says?
+fn is_straight(best: &Scored, line: &Scored) -> bool {
+    let physics = |scored: &Scored| scored.candidate.family.physics;
+    if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.window != line.candidate.window {
+        return false;
+    }
+    let effect = |scored: &Scored, cell: usize| scored.candidate.effect(cell, &scored.coefficients);
+    line.candidate.columns.iter().flat_map(|column| &column.parts).all(|(cell, _)| {
+        let (loops, straight) = (effect(best, *cell), effect(line, *cell));
+        let overlap = dot(&loops, &straight).powi(2) / (dot(&loops, &loops) * dot(&straight, &straight)).max(1e-300);
+        loops.len() == straight.len() && overlap > 1.0 - OFF_THE_LINE * OFF_THE_LINE
+    })
+}
+
+/// Brings the likeliest of those that are about as good as the best to the front, which is mostly the simplest.
+pub(super) fn likeliest_first(claims: &mut [Scored], equal: f64, robot: &Robot) {
+    let last_link = robot.joint_count() - 1;
+    let Some(best) = claims.first() else { return };
+    let good = |best: &Scored, claim: &Scored| {
+        let held = held(&best.candidate, &claim.candidate, last_link);
+        let share =
+            if held.is_some() && robot.simulates_itself && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
+        claim.score >= best.score - (share * best.score.abs()).max(3.0)
+    };
+    let likeliest = (0..claims.len()).filter(|k| good(best, &claims[*k])).max_by(|a, b| {
+        // A part of the best is as good as that, within what the best would have to be better by.
+        let score =
+            |k: usize| if held(&best.candidate, &claims[k].candidate, last_link).is_some() { best.score } else { claims[k].score };
+        let more = |k: usize| complexity(&claims[k].candidate) - complexity(&best.candidate);
+        let of = |k: usize| likelihood(score(k), best.score, more(k));
+        // Of equals the better one.
+        of(*a).total_cmp(&of(*b)).then(b.cmp(a))
+    });
+    if let Some(k) = likeliest {
+        claims[..=k].rotate_right(1);
+    }
+    // Of what was taken for simpler, the part may be enough.
+    let Some(part) = claims.iter().position(|c| held(&claims[0].candidate, &c.candidate, last_link).is_some()) else { return };
+    if good(&claims[0], &claims[part]) {
+        claims[..=part].rotate_right(1);
+    }
+}
+
+/// What each number that a claim fits takes off the logarithm of its likelihood: of claims that predict alike the simplest was right so much
+/// more often (docs/proof.md, stated and observed probability).
+const PER_NUMBER: f64 = 1.5;
+
+/// By how much scores differ, nats, whose claims differ by one in the logarithm of their likelihood, near the best score: structural error
+/// makes the scale of the scores a share of them.
+pub(crate) fn score_scale(best: f64) -> f64 {
+    (0.01 * best).max(2.0)
+}
+
+/// Logarithm of how likely a claim of some score is beside another that fits so many numbers less.
+pub(crate) fn likelihood(score: f64, beside: f64, more: f64) -> f64 {
+    (score - beside) / score_scale(beside) - PER_NUMBER * more
+}
+
+/// Numbers that a candidate fits, and between equals what is less usual.
+pub(crate) fn complexity(candidate: &Candidate) -> f64 {
+    let shape = candidate.family.steps.iter().filter(|step| step.is_some()).count();
+    // What rounds a sign is not a claim of its own.
+    let rounding = candidate.family.shape.iter().filter(|name| rounds(name)).count();
+    (candidate.columns.len() + shape - rounding + candidate.edges()) as f64 + 0.1 * candidate.family.penalty_nats
+}
+
+/// Share of a claim's score by which a form of more numbers has to be better than a simpler one.
+const SAME_FORM: f64 = 0.01;
+
+/// Is there a form of the same claim that fits fewer numbers and does as well?
+pub(super) fn simpler_is_enough<'s>(form: &Scored, all: impl IntoIterator<Item = &'s Scored>) -> bool {
+    all.into_iter().any(|other| {
+        other.candidate.same_claim(&form.candidate)
+            && complexity(&other.candidate) < complexity(&form.candidate)
+            && other.score >= (1.0 - SAME_FORM) * form.score
+    })
+}
