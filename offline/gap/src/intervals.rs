@@ -50,17 +50,15 @@ const UNDECIDED: f64 = 3.0;
 /// the model's load, the weights that a lab gives its links (measured on trials whose truths were open by then).
 fn common(physics: &str, form: &str, name: &str) -> f64 {
     match (physics, name) {
-        ("external_contact", "k") => 0.12,
-        ("external_contact", "p") => 0.2,
         ("thermal_drift", "T") => 0.5,
         ("cable_hysteresis", "n" | "g") => 0.6,
         ("stribeck_friction", _) => 0.35,
         ("cable_hysteresis", "z_m") | ("load_dependent_friction" | "torque_ripple" | "thermal_drift", _) => 0.3,
         ("payload", "m_p") if form == AT_THE_TIP => 0.25,
-        ("cable_creep", "T_k") => 0.2,
+        ("cable_creep", "T_k") | ("external_contact", "p") => 0.2,
         ("gravity_direction" | "cable_hysteresis", _) => 0.15,
         ("cable_stretch", _) => 0.1,
-        ("cable_creep" | "frame_misalignment", _) => 0.12,
+        ("cable_creep" | "frame_misalignment", _) | ("external_contact", "k") => 0.12,
         ("payload" | "link_inertia" | "external_contact", _) => 0.08,
         ("measurement_delay" | "link_geometry", _) => 0.05,
         ("motor_torque_scale", _) => 0.025,

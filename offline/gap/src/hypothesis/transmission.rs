@@ -147,9 +147,9 @@ fn lag(dictionary: &Dictionary, width: f64, moves: &dyn Fn(&Run) -> [&[f64]; 2])
             inner = f64::clamp(inner, x - 0.5 * width, x + 0.5 * width);
             x - inner
         };
-        past.iter().for_each(|x| {
+        for x in past {
             follow(x);
-        });
+        }
         series.iter().map(follow).collect()
     })
 }
