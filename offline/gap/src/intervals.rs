@@ -56,9 +56,10 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("cable_hysteresis", "z_m") | ("load_dependent_friction" | "torque_ripple" | "thermal_drift", _) => 0.3,
         ("payload", "m_p") if form == AT_THE_TIP => 0.25,
         ("cable_creep", "T_k") | ("external_contact", "p") => 0.2,
-        ("gravity_direction" | "cable_hysteresis", _) => 0.15,
-        ("cable_stretch", _) => 0.1,
-        ("cable_creep" | "frame_misalignment", _) | ("external_contact", "k") => 0.12,
+        // How steeply dry friction turns round says how late it is.
+        ("measurement_delay", _) if form == "torque" => 0.2,
+        ("gravity_direction" | "cable_hysteresis" | "cable_creep", _) => 0.15,
+        ("cable_stretch" | "frame_misalignment", _) | ("external_contact", "k") => 0.12,
         ("payload" | "link_inertia" | "external_contact", _) => 0.08,
         ("measurement_delay" | "link_geometry", _) => 0.05,
         ("motor_torque_scale", _) => 0.025,
