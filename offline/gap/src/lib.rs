@@ -36,6 +36,7 @@ pub mod needed;
 mod past;
 mod pictures;
 mod regime;
+mod region;
 pub mod seldom;
 pub mod shaking;
 mod turning;

@@ -21,7 +21,7 @@ use crate::robot::Robot;
 use crate::run::{Extent, Run};
 use crate::search::{Effect, Scored, complexity, is_uneven, likelihood, score_scale};
 use crate::seldom::Seldom;
-use crate::{experiment, regime};
+use crate::{experiment, regime, region};
 
 /// The schema's name of a channel.
 pub(crate) fn told(channel: Channel) -> Told {
@@ -261,7 +261,8 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let probability = 1.0 / total;
     let candidate = &effect.chosen.candidate;
     let physics = physics(candidate);
-    let location = location(found, candidate, estimate, effect.share);
+    let mut location = location(found, candidate, estimate, effect.share);
+    location.workspace_region = region::of_effect(found, k, main_cell(found.floors, candidate, &estimate.coefficients));
     let fit = fits(found, candidate, &estimate.coefficients);
     let score = Score {
         folds: Some(found.problem.block_count as u64),

@@ -1,7 +1,7 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
 use crate::common::{Case, Folder, done, holds, made, named, near, parameter, primary, report, text, wanted, with_effect, written};
-use gap_report::{Channel, Report, Status};
+use gap_report::{Channel, RegionKind, Report, Status};
 use generator::order::{Kind, Order, Wanted};
 use generator::trajectory::Excitation;
 use std::path::{Path, PathBuf};
@@ -130,15 +130,25 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
 #[test]
 fn a_wall_has_the_exponent_that_fits_once_it_is_in_place() {
     // The grid's walls are too far apart to tell: of these the exponents came out the other way round, and stiffnesses by the unit that goes with them.
-    for (seed, id, stiffness, exponent) in
-        [(3_848_609_202, "5f5e6e7b21ab", 4554.5, 1.5), (3_282_418_269, "7ccc9963eb98", 242.97, 1.0)]
-    {
+    // Of the second both runs touch the same part, which is a region; of the first each run another.
+    let walls = [
+        (3_848_609_202, "5f5e6e7b21ab", 4554.5, 1.5, RegionKind::All),
+        (3_282_418_269, "7ccc9963eb98", 242.97, 1.0, RegionKind::Box),
+    ];
+    for (seed, id, stiffness, exponent, kind) in walls {
         let (report, _) = of_matrix("full", seed, id);
         let first = primary(&report)[0];
         assert_eq!(first.physics.to_string(), "external_contact", "{}", report.summary);
         holds(first, "k", stiffness, 0.1);
         let (power, [low, high]) = parameter(first, "p");
         assert!((power - exponent).abs() < 1e-9 && high - low < 1.0, "{power} ({low} to {high})");
+        let region = &first.location.workspace_region;
+        assert_eq!(region.kind, kind);
+        if kind == RegionKind::Box {
+            // The wall is at larger x and smaller y.
+            assert!(region.energy_share.is_some_and(|share| share > 0.95));
+            assert_eq!(region.axes.as_ref().expect("axes")[..2], ["x", "y"]);
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::fits::fit;
 use super::tags::{HALF_PX, around, figure, list, section, table, text};
 use crate::figures::{before_after, channel_title, signature, spectrum};
 use crate::text::{
-    Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, short, with_unit,
+    Estimate, capital, duration, joints, listed, names_something, parameter_name, percent, probability, region, short, with_unit,
 };
 use crate::{Confusable, Evidence, Experiment, Identifiable, Parameter, Physics, Pictures, Report, Verdict};
 
@@ -81,6 +81,7 @@ fn place(verdict: &Verdict) -> String {
         let share = regime.energy_share.map_or_else(String::new, |share| format!(" ({} of it)", percent(share)));
         said.push(format!("{}{share}.", capital(&regime.condition)));
     }
+    said.extend(region(&location.workspace_region).map(|place| format!("Mostly where {place}.")));
     for stretch in &location.time_intervals {
         said.push(format!("In {}, from {:.1} to {:.1}\u{a0}s.", stretch.run, stretch.start_s, stretch.end_s));
     }

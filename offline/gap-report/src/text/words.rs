@@ -3,6 +3,7 @@
 use super::headline::{headlines_unbroken, plain_spaces, quality_headline};
 use super::joints::{capital, joints, listed};
 use super::number::{as_given, percent, probability};
+use super::region::region;
 use crate::{Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
 
 /// Characters per line.
@@ -28,6 +29,8 @@ pub fn words(report: &Report) -> String {
     let told = usize::from(report.status == Status::InsufficientData);
     rest.extend(report.quality(Level::Fail).skip(told).take(MOST).map(|check| ("Put right first", quality_headline(check))));
     rest.extend(fits(report).into_iter().map(|line| ("Held-out runs", line)));
+    let places = report.told().filter_map(|verdict| region(&verdict.location.workspace_region));
+    rest.extend(places.take(MOST).map(|place| ("Mostly where", place)));
     if report.status == Status::NoMismatch {
         rest.extend(agreement(report).map(|line| ("Resolution", line)));
     }

@@ -244,6 +244,12 @@ impl Region {
         }
     }
 
+    /// Of the tip in the base frame, m: limits along some of its axes.
+    pub fn tip_box(axes: Vec<String>, min: Vec<f64>, max: Vec<f64>) -> Self {
+        let (frame, unit) = (Some("base".to_owned()), Some("m".to_owned()));
+        Self { kind: RegionKind::Box, frame, axes: Some(axes), min: Some(min), max: Some(max), unit, ..Self::all() }
+    }
+
     /// Between two joint positions, one entry per joint, in rad or m as the joints have it.
     pub fn joint_box(joints: Vec<String>, min: Vec<f64>, max: Vec<f64>, unit: impl Into<String>) -> Self {
         let unit = Some(unit.into());
