@@ -19,7 +19,7 @@ use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
-use crate::search::{Effect, Scored, complexity, is_uneven, likelihood, score_scale};
+use crate::search::{Effect, Scored, complexity, is_uneven, likelihood};
 use crate::seldom::Seldom;
 use crate::{experiment, regime, region};
 
@@ -246,7 +246,7 @@ fn weight_beside(chosen: &Scored, rival: &Scored) -> f64 {
 /// Weight of an effect, of its rivals and of none of them together.
 fn total_weight(effect: &Effect) -> f64 {
     let chosen = &effect.chosen;
-    let none = (-chosen.score / score_scale(chosen.score)).exp();
+    let none = likelihood(0.0, chosen.score, 0.0).exp();
     1.0 + effect.rivals.iter().map(|r| weight_beside(chosen, r)).sum::<f64>() + none
 }
 
