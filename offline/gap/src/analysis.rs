@@ -8,6 +8,7 @@ use recordings::Recording;
 use simulator::model::RobotModel;
 
 use crate::gates;
+use crate::held_out::{HeldOut, Refused, sized};
 use crate::hypothesis::Dictionary;
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
@@ -148,6 +149,8 @@ pub struct Found<'a> {
     pub controller: Option<crate::controller::Changed>,
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
+    /// What explained most, and not what was held out.
+    pub refused: Option<&'a Refused>,
     /// Something far above the noise where nothing was found.
     pub seldom: Option<Seldom>,
 }
@@ -175,8 +178,6 @@ const OF_A_MODEL: f64 = 0.05;
 /// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
 const ABOUT: f64 = 0.4;
 /// An effect that gains less than so many times what is asked has to leave less of what was held out, too; and a memory, whose many
-/// numbers find something in most of what they are fitted to, always.
-const BARELY: f64 = 3.0;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
@@ -371,19 +372,15 @@ fn analyse_with(
     progress("sizes and intervals");
     let held_problem = prior.put_on(Problem::new(&robot, &nominal, &held, BLOCK_S));
     let held_dictionary = Dictionary::new(&held_problem);
-    let mut estimates = estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
-    if let [only] = answer.effects.as_slice()
-        && (only.gain.nats < BARELY * options.thresholds.nats || !only.chosen.candidate.family.limits.is_empty())
-        && !verdicts::hold_up(&problem, &held_dictionary, (&answer.effects, &estimates), &floors)
-    {
-        answer.withdraw();
-        estimates.clear();
-    }
+    let sizes = |answer: &Answer| estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
+    let mut estimates = sizes(&answer);
+    let held_out = HeldOut { problem: &problem, dictionary: &held_dictionary, floors: &floors };
+    let refused = held_out.judge(&mut answer, &mut estimates, &sizes, &thresholds);
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {
-            crate::nominal::rms(verdicts::left(&problem, c, answer.effects.iter().zip(&estimates)).into_iter())
+            crate::nominal::rms(verdicts::left(&problem, c, sized(&answer.effects, &estimates).into_iter()).into_iter())
                 >= problem.practical.any[c]
         })
         && beyond > 2.0 * options.thresholds.nats
@@ -413,7 +410,8 @@ fn analyse_with(
         controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,
         // Only against a lab's own simulation, whose floors are known.
-        seldom: (answer.effects.is_empty() && !unmodelled && !from_recording && simulated_by_lab)
+        refused: refused.as_ref(),
+        seldom: (answer.effects.is_empty() && refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
             .then(|| seldom::left(&problem, &floors))
             .flatten(),
     };

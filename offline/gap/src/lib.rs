@@ -31,6 +31,7 @@ mod corrected;
 mod experiment;
 pub mod floors;
 mod gates;
+pub mod held_out;
 mod known;
 pub mod needed;
 mod past;

@@ -5,6 +5,7 @@ use arm::serial::Workspace;
 use gap_report::Region;
 
 use crate::analysis::Found;
+use crate::held_out::sized;
 use crate::hypothesis::{Candidate, Window};
 use crate::problem::Problem;
 
@@ -116,7 +117,8 @@ fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f
 }
 
 fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
-    let others = found.answer.effects.iter().zip(found.estimates).enumerate().filter(|(k, _)| *k != effect).map(|(_, both)| both);
+    let others =
+        sized(&found.answer.effects, found.estimates).into_iter().enumerate().filter(|(k, _)| *k != effect).map(|(_, one)| one);
     let without = crate::verdicts::left(found.problem, cell, others);
     let candidate = &found.answer.effects[effect].chosen.candidate;
     let own = candidate.effect(cell, &found.estimates[effect].coefficients);

@@ -80,6 +80,8 @@ pub struct Gain {
     /// Standard errors over blocks that the squared error explained is above none; 0 where too few blocks tell. Where one block keeps more
     /// error than all others hold, `error` is large though each of them is explained.
     pub explained: f64,
+    /// The same by ranks (Wilcoxon): of how many blocks more is explained than lost, whatever the largest ones say.
+    pub ranks: f64,
 }
 
 impl<'a> Scorer<'a> {
@@ -312,7 +314,8 @@ impl<'a> Scorer<'a> {
             Some(error) if of_blocks.len() >= ENOUGH_BLOCKS => of_blocks.iter().sum::<f64>() / error.max(1e-300),
             _ => 0.0,
         };
-        Gain { nats, error, least, explained }
+        let ranks = signed_ranks(&of_blocks);
+        Gain { nats, error, least, explained, ranks }
     }
 }
 
@@ -322,6 +325,15 @@ fn error_of_sum(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / blocks.max(1.0);
     let spread: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
     (values.len() > 1).then(|| (blocks / (blocks - 1.0) * spread).sqrt())
+}
+
+/// Wilcoxon's signed ranks, in their standard deviations if signs were even.
+fn signed_ranks(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let sum: f64 = sorted.iter().zip(1..).map(|(x, rank)| f64::from(rank) * x.signum()).sum();
+    let n = sorted.len() as f64;
+    sum / (n * (n + 1.0) * (2.0 * n + 1.0) / 6.0).sqrt().max(1e-300)
 }
 
 /// Are the coefficients of a candidate, the last ones of a fit, what they may be?

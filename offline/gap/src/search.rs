@@ -8,7 +8,7 @@ use std::sync::Arc;
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
-use crate::hypothesis::{Candidate, Dictionary, Family, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
+use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
 use crate::noise::Noise;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
@@ -45,6 +45,11 @@ const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach, or the squared error that it explains,
 const SEEN_OFTEN: f64 = 2.0;
 const EXPLAINED_OFTEN: f64 = 3.0;
+/// or the ranks of its blocks, which the largest one does not sway;
+/// nats without the block that says most that are enough for what is there so shortly that blocks cannot be told apart, if it is said in
+/// few numbers and nothing else is said,
+const SURE: f64 = 36.0;
+const FEW: usize = 2;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
@@ -64,6 +69,9 @@ const NEAR_IN_WINDOW: f64 = 0.5;
 
 /// Share of the best claim's score from which on a rival begins again with its rounding.
 const ROUNDED: f64 = 0.2;
+
+/// Claims that are judged before no further effect is said to be there: so many of the first, and of those that gain most.
+const JUDGED: usize = 5;
 
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
@@ -133,15 +141,44 @@ pub struct Answer<'a> {
 }
 
 impl Answer<'_> {
-    /// Takes everything back that was accepted; the first of it is then the best that was not.
-    pub fn withdraw(&mut self) {
-        let first = (!self.effects.is_empty()).then(|| self.effects.remove(0).chosen);
-        self.effects.clear();
-        self.grams = self.scorer.empty();
-        self.fit = self.none.clone();
-        self.scorer.temper(&self.grams, &self.fit);
-        self.next = first.or(self.next.take());
+    /// Takes an effect back that was accepted; the last of them is then the best that was not.
+    pub fn take_back(&mut self, effect: usize) -> Effect {
+        let taken = self.effects.remove(effect);
+        if self.effects.is_empty() {
+            self.next = Some(taken.chosen.clone());
+        }
+        self.fit_anew();
+        taken
     }
+
+    /// Takes a rival of an effect in its place. What was chosen is no longer among the rivals.
+    pub fn exchange(&mut self, effect: usize, rival: usize) {
+        let rival = self.effects[effect].rivals.remove(rival);
+        self.effects[effect].gain = rival.gain;
+        self.effects[effect].chosen = rival;
+        self.fit_anew();
+        let base = self.grams_of(|k| k != effect);
+        let before = self.scorer.fit(&base);
+        let after = self.scorer.fit(&self.scorer.extended(&base, &self.effects[effect].chosen.candidate.columns));
+        self.effects[effect].share = shares(&before, &after).into_iter().fold(0.0, f64::max);
+    }
+
+    fn grams_of(&self, which: impl Fn(usize) -> bool) -> Grams {
+        let of = self.effects.iter().enumerate().filter(|(k, _)| which(*k));
+        of.fold(self.scorer.empty(), |grams, (_, effect)| self.scorer.extended(&grams, &effect.chosen.candidate.columns))
+    }
+
+    fn fit_anew(&mut self) {
+        self.grams = self.grams_of(|_| true);
+        self.fit = self.scorer.fit(&self.grams);
+        self.scorer.temper(&self.grams, &self.fit);
+    }
+}
+
+/// Shares of the cells' squared errors, held out, that one fit leaves out and another has.
+fn shares(before: &Fit, after: &Fit) -> Vec<f64> {
+    let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
+    (0..before.held_out.len()).map(|c| 1.0 - sum(after, c) / sum(before, c).max(1e-300)).collect()
 }
 
 /// Measurement noise of every cell: white at the sensor, coloured by the window.
@@ -182,7 +219,7 @@ pub fn search<'p>(
         let ranked = search.rank(&chosen);
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
         let mut accepted = None;
-        for scored in ranked.into_iter().take(5) {
+        for scored in to_judge(ranked) {
             let judged = search.judged(&base, &chosen, &scored);
             trace(format!("  judged: {} {judged:.2?}", describe(&scored)));
             if search.accepts(&scored, &judged) {
@@ -217,8 +254,7 @@ impl Search<'_, '_> {
         let grams = self.scorer.extended(base, &scored.candidate.columns);
         let after = self.scorer.fit(&grams);
         let gain = self.significance(others, &scored.candidate);
-        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
-        let shares: Vec<f64> = (0..before.held_out.len()).map(|c| 1.0 - sum(&after, c) / sum(&before, c).max(1e-300)).collect();
+        let shares = shares(&before, &after);
         let mut start = 0;
         let mut sizes: Vec<Vec<f64>> = Vec::new();
         for candidate in others.iter().chain([&scored.candidate]) {
@@ -271,12 +307,13 @@ impl Search<'_, '_> {
                 let between = scorer.gain_in(&before, &after, |b| shown[b] && !edges[b]);
                 gain.error = gain.error.min(between.error);
                 gain.explained = gain.explained.max(between.explained);
+                gain.ranks = gain.ranks.max(between.ranks);
             }
             if best.is_none_or(|b| gain.nats > b.nats) {
                 best = Some(gain);
             }
         }
-        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0, explained: 0.0 })
+        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0, explained: 0.0, ranks: 0.0 })
     }
 
     /// Autoregression of what a set leaves, per cell.
@@ -303,9 +340,11 @@ impl Search<'_, '_> {
         // In a window it is met for as long as that lasts; a wall is met seldom all the same.
         let family = &scored.candidate.family;
         let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
+        let often = judged.gain.ranks > SEEN_OFTEN;
+        let short = alone && scored.candidate.edges() > 0 && scored.candidate.columns.len() <= FEW && judged.gain.least > SURE;
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
-            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || is_uneven(&judged.gain))
+            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || is_uneven(&judged.gain) || often || short)
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
@@ -426,8 +465,8 @@ impl Search<'_, '_> {
             let scale = (self.scorer.gain(&base, &after).nats.max(0.0) / best.gain.nats).min(1.0);
             self.scorer.untempered();
             for scored in &mut claims {
-                let Gain { nats, error, least, explained } = scored.gain;
-                scored.gain = Gain { nats: scale * nats, error: scale * error, least: scale * least, explained };
+                let Gain { nats, error, least, explained, ranks } = scored.gain;
+                scored.gain = Gain { nats: scale * nats, error: scale * error, least: scale * least, explained, ranks };
                 scored.score = scored.gain.nats - price(&scored.candidate);
             }
         }
@@ -444,7 +483,7 @@ impl Search<'_, '_> {
         let Some((best, window)) = best.and_then(|best| Some((best, best.candidate.window?))) else { return Vec::new() };
         let mut forms = best_of(self.candidates.len(), Candidate::same_form, &|k| {
             let candidate = self.candidates[k].within(self.problem, window);
-            if candidate.shows() && candidate.family.form != STEPS_IN_TIME { self.score(grams, base, &candidate) } else { None }
+            if candidate.shows() && may_have_edges(&candidate.family) { self.score(grams, base, &candidate) } else { None }
         });
         sort(&mut forms);
         let mut forms = distinct_by(&forms, Candidate::same_form);
@@ -574,6 +613,17 @@ impl Search<'_, '_> {
 /// How much of what a whole says its first part has to say at least beside the others, which may pull the whole the other way.
 const BORNE_OUT: f64 = 0.5;
 
+/// The claims that are judged, in this order: the first ones, and those that gain most however much they pay. Where the best one leaves much
+/// that is not independent from row to row, as one of two effects does, prices weigh more than all gains, and what explains nothing but
+/// costs nothing stands first.
+fn to_judge(ranked: Vec<Scored>) -> Vec<Scored> {
+    let mut by_gain: Vec<usize> = (0..ranked.len()).collect();
+    by_gain.sort_by(|a, b| ranked[*b].gain.nats.total_cmp(&ranked[*a].gain.nats));
+    let first = (0..ranked.len()).take(JUDGED);
+    let order: Vec<usize> = first.chain(by_gain.into_iter().take(JUDGED).filter(|k| *k >= JUDGED)).collect();
+    order.into_iter().map(|k| ranked[k].clone()).collect()
+}
+
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
     let has_level = |candidate: &Candidate| match candidate.family.physics {
@@ -584,9 +634,14 @@ fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
     one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
 }
 
-/// May a form be there in a part of a run only? Steps would have an edge more than they say.
+/// May a form be there in a part of a run only?
 fn comes_and_goes(family: &Family) -> bool {
-    !ALWAYS.contains(&family.physics) && family.form != STEPS_IN_TIME
+    !ALWAYS.contains(&family.physics) && may_have_edges(family)
+}
+
+/// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant.
+fn may_have_edges(family: &Family) -> bool {
+    family.form != STEPS_IN_TIME && !HARDENING.contains(&family.form)
 }
 
 /// What a candidate pays for being one of many or less likely, nats.

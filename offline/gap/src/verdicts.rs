@@ -12,9 +12,10 @@ use gap_report::{
 use crate::analysis::{Found, Given, Options, Outcome};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
-use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
+use crate::held_out::{HeldOut, Refused, sized};
+use crate::hypothesis::{Candidate, UNMODELLED};
 use crate::intervals::{Edge, Estimate};
-use crate::nominal::{less_means, rms};
+use crate::nominal::rms;
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
@@ -120,7 +121,13 @@ pub(crate) fn outcome(
             primary.fit.extend(again.iter().cloned());
         }
     }
-    let unnamed = found.controller.is_some() || found.seldom.is_some() || effects.iter().any(|effect| !effect.is_named());
+    let unnamed = found.controller.is_some()
+        || found.seldom.is_some()
+        || found.refused.is_some()
+        || effects.iter().any(|effect| !effect.is_named());
+    if let (Some(refused), None) = (found.refused, found.controller) {
+        verdicts.push(not_held(found, effects.len() as u64 + 1, refused));
+    }
     if let Some(changed) = found.controller {
         verdicts.push(another_controller(found, effects.len() as u64 + 1, changed));
     }
@@ -417,61 +424,21 @@ fn interval(run: &Run, window: &[Option<Edge>; 2]) -> Interval {
 
 /// Residuals of a cell of what was held out, before and after the correction by all effects.
 pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
-    corrected(found.problem, found.held_dictionary, (&found.answer.effects, found.estimates), &found.beside[cell], cell)
-}
-
-/// The same of some effects with their sizes, beside the likeliest values of what is known only roughly.
-fn corrected(
-    problem: &Problem,
-    held_dictionary: &Dictionary,
-    (effects, estimates): (&[Effect], &[Estimate]),
-    beside: &[f64],
-    cell: usize,
-) -> Option<(usize, Vec<f64>, Vec<f64>)> {
-    let (of, held) = (&problem.cells[cell], held_dictionary.problem);
-    let c = held.cell(of.channel, of.index)?;
-    let before = held.cells[c].residual.clone();
-    let mut after = before.clone();
-    for (effect, estimate) in effects.iter().zip(estimates) {
-        let own = &effect.chosen.candidate;
-        let there = Candidate::new(held_dictionary, &own.family, &own.shape, own.window);
-        there.take_off(c, &estimate.coefficients, &mut after);
-    }
-    let nuisance = &held.nuisances[c];
-    if problem.nuisances[cell].of_run.contains(&true) {
-        let rows = &held.cells[c].rows;
-        after = less_means(&after, |k| rows[k].0);
-    } else if nuisance.columns.len() == beside.len() && !nuisance.columns.is_empty() {
-        after.iter_mut().zip(nuisance.predict(beside)).for_each(|(y, p)| *y -= p);
-    }
-    Some((c, before, after))
-}
-
-/// Do effects leave less of what was held out, in the cell where the first of them shows most?
-pub(crate) fn hold_up(
-    problem: &Problem,
-    held_dictionary: &Dictionary,
-    (effects, estimates): (&[Effect], &[Estimate]),
-    floors: &[f64],
-) -> bool {
-    let Some((effect, estimate)) = effects.iter().zip(estimates).next() else { return true };
-    let cell = main_cell(floors, &effect.chosen.candidate, &estimate.coefficients);
-    let beside = &beside(problem, effects, estimates)[cell];
-    corrected(problem, held_dictionary, (effects, estimates), beside, cell)
-        .is_none_or(|(_, before, after)| rms(after.into_iter()) < rms(before.into_iter()))
+    let of = HeldOut { problem: found.problem, dictionary: found.held_dictionary, floors: found.floors };
+    of.corrected(&sized(&found.answer.effects, found.estimates), &found.beside[cell], cell)
 }
 
 /// Likeliest values of what is known only roughly beside all effects, per cell.
 pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
-    let left = |c: usize| left(problem, c, effects.iter().zip(estimates));
+    let left = |c: usize| left(problem, c, sized(effects, estimates).into_iter());
     (0..problem.cells.len()).map(|c| problem.nuisances[c].estimate(&left(c))).collect()
 }
 
 /// What effects leave of the residual of a cell.
-pub(crate) fn left<'e>(problem: &Problem, c: usize, effects: impl Iterator<Item = (&'e Effect, &'e Estimate)>) -> Vec<f64> {
+pub(crate) fn left<'e>(problem: &Problem, c: usize, effects: impl Iterator<Item = (&'e Candidate, &'e [f64])>) -> Vec<f64> {
     let mut left = problem.cells[c].residual.clone();
-    for (effect, estimate) in effects {
-        effect.chosen.candidate.take_off(c, &estimate.coefficients, &mut left);
+    for (candidate, coefficients) in effects {
+        candidate.take_off(c, coefficients, &mut left);
     }
     left
 }
@@ -569,6 +536,21 @@ fn seen_seldom(found: &Found, seldom: &Seldom) -> Verdict {
     Verdict::unmodelled(1, 0.9, location, Evidence::new("size over the noise floor", claim, (seldom.rms, unit), TestMethod::Gate))
 }
 
+/// The verdict of an effect whose explanation does not hold on what was held out.
+fn not_held(found: &Found, number: u64, refused: &Refused) -> Verdict {
+    let candidate = &refused.effect.chosen.candidate;
+    let cell = &found.problem.cells[refused.cell];
+    let (unit, [without, with]) = (cell_unit(found.robot, cell), refused.rms);
+    let regime = Regime::new(Feature::All, "depends on what differs from run to run".to_owned());
+    let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), Subsystem::Unknown, regime);
+    location.energy_share = Some(refused.effect.share.clamp(0.0, 1.0));
+    let claim = format!(
+        "{} explains what was fitted, but what was held out differs by {with:.3e} {unit} RMS with it and by {without:.3e} without",
+        candidate.family.physics.replace('_', " ")
+    );
+    Verdict::unmodelled(number, 0.9, location, Evidence::new("held-out data", claim, (with, unit), TestMethod::HeldOutGain))
+}
+
 /// The verdict of an effect that the vocabulary has no name for.
 fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Verdict {
     let candidate = &effect.chosen.candidate;
@@ -593,6 +575,7 @@ fn remaining(found: &Found) -> Remaining {
         .map(|e| e.chosen.candidate.family.form)
         .chain(found.controller.map(|_| "tracking error"))
         .chain(found.seldom.as_ref().map(|_| "time"))
+        .chain(found.refused.map(|_| "what differs from run to run"))
         .collect();
     // Of what was gained, the part that has names.
     let gained = |named: bool| found.answer.effects.iter().filter(|e| !named || e.is_named()).map(|e| e.gain.nats).sum::<f64>();
