@@ -155,6 +155,13 @@ pub struct Found<'a> {
     pub seldom: Option<Seldom>,
 }
 
+impl Found<'_> {
+    /// What was held out.
+    pub(crate) fn held_out(&self) -> HeldOut<'_> {
+        HeldOut { problem: self.problem, dictionary: self.held_dictionary, floors: self.floors }
+    }
+}
+
 /// Least length of what is fitted on, s.
 const SHORTEST_S: f64 = 6.0;
 /// Fewest rows of a run.
@@ -177,7 +184,6 @@ const REMOVED: f64 = 0.95;
 const OF_A_MODEL: f64 = 0.05;
 /// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
 const ABOUT: f64 = 0.4;
-/// An effect that gains less than so many times what is asked has to leave less of what was held out, too; and a memory, whose many
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
@@ -409,8 +415,8 @@ fn analyse_with(
         beside: &beside,
         controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
         unmodelled,
-        // Only against a lab's own simulation, whose floors are known.
         refused: refused.as_ref(),
+        // Only against a lab's own simulation, whose floors are known.
         seldom: (answer.effects.is_empty() && refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
             .then(|| seldom::left(&problem, &floors))
             .flatten(),

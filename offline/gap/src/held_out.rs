@@ -18,6 +18,8 @@ const BARELY: f64 = 3.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.
 const INSTEAD: f64 = 0.5;
 const NEAR: f64 = 0.3;
+/// Of its squared size where it was fitted, what it has to have there to be judged.
+const SHOWS: f64 = 1e-6;
 /// What may be otherwise in each run: whether the hand touches, how warm a drive is when it begins.
 const OTHERWISE: [&str; 2] = ["external_contact", "thermal_drift"];
 
@@ -39,17 +41,29 @@ pub(crate) fn sized<'a>(effects: &'a [Effect], estimates: &'a [Estimate]) -> Vec
     effects.iter().zip(estimates).map(|(effect, estimate)| (&effect.chosen.candidate, &estimate.coefficients[..])).collect()
 }
 
+/// All but one of them.
+pub(crate) fn others<'a>(all: &[Sized<'a>], without: usize) -> Vec<Sized<'a>> {
+    all.iter().enumerate().filter(|(k, _)| *k != without).map(|(_, one)| *one).collect()
+}
+
 /// An effect that explains what was fitted and not what was held out.
 #[derive(Debug, Clone)]
 pub struct Refused {
     /// What was accepted.
     pub effect: Effect,
-    /// Its coefficients.
-    pub coefficients: Vec<f64>,
     /// Cell in which it shows most.
     pub cell: usize,
     /// RMS of what was held out there, without it and with it, in the cell's unit.
     pub rms: [f64; 2],
+    /// Is what was held out a later part of the only run?
+    pub later: bool,
+}
+
+impl Refused {
+    /// What the error goes with then.
+    pub(crate) fn goes_with(&self) -> &'static str {
+        if self.later { "what differs from one part of the run to the next" } else { "what differs from run to run" }
+    }
 }
 
 impl HeldOut<'_> {
@@ -62,48 +76,48 @@ impl HeldOut<'_> {
         thresholds: &Thresholds,
     ) -> Option<Refused> {
         let mut refused = None;
-        // Each step takes an effect back, or a rival that holds: of no effect twice.
-        let mut exchanged = Vec::new();
+        // Each step takes an effect back, or a rival that holds there; a rival that no longer does is not exchanged again.
         loop {
             let all = sized(&answer.effects, estimates);
             let fails = |k: &usize| !self.holds(answer, &all, *k, thresholds);
             let Some(k) = (0..all.len()).rev().find(fails) else { return refused };
-            let rival = if exchanged.contains(&answer.effects[k].chosen.candidate.family.physics) {
-                None
-            } else {
-                self.rival(answer, &all, k, thresholds)
-            };
+            let rival = if answer.effects[k].second { None } else { self.rival(answer, &all, k, thresholds) };
             if let Some(rival) = rival {
                 answer.exchange(k, rival);
-                exchanged.push(answer.effects[k].chosen.candidate.family.physics);
             } else {
                 let cell = main_cell(self.floors, all[k].0, all[k].1);
                 let rms = self.without_and_with(&all, k, all[k], cell).map(|(without, with, _)| [without.sqrt(), with.sqrt()]);
-                let coefficients = all[k].1.to_vec();
-                let barely = is_barely(answer, k, thresholds);
                 let effect = answer.take_back(k);
-                if let (0, false, true, Some(rms)) = (k, barely, effect.is_named(), rms) {
-                    refused = Some(Refused { effect, coefficients, cell, rms });
+                let large = effect.gain.nats >= BARELY * thresholds.nats && effect.is_named();
+                if let (0, true, Some(rms), None) = (k, large, rms, &refused) {
+                    refused = Some(Refused { effect, cell, rms, later: self.is_later_part() });
                 }
             }
             *estimates = sizes(answer);
         }
     }
 
+    /// Is what was held out a later part of the only run?
+    fn is_later_part(&self) -> bool {
+        let id = |problem: &Problem| problem.pairs[0].real.run.id.clone();
+        id(self.problem) == id(self.dictionary.problem)
+    }
+
     fn holds(&self, answer: &Answer, all: &[Sized], k: usize, thresholds: &Thresholds) -> bool {
-        let physics = all[k].0.family.physics;
+        let (claim, coefficients) = all[k];
         let barely = is_barely(answer, k, thresholds);
-        if !barely && (OTHERWISE.contains(&physics) || physics == UNMODELLED) {
+        // What came on the way may have gone before the rest.
+        let gone = claim.edges() > 0 && self.is_later_part();
+        if !barely && (OTHERWISE.contains(&claim.family.physics) || claim.family.physics == UNMODELLED || gone) {
             return true;
         }
-        let cell = main_cell(self.floors, all[k].0, all[k].1);
-        match self.without_and_with(all, k, all[k], cell) {
-            // It does not show there.
-            Some((_, _, own)) if own <= 0.0 => !barely,
-            Some((without, with, own)) if barely => without - with > HOLDS_BARELY * own,
-            Some((without, with, own)) => without - with >= HOLDS * own,
-            None => true,
+        let cell = main_cell(self.floors, claim, coefficients);
+        let Some((without, with, own)) = self.without_and_with(all, k, all[k], cell) else { return true };
+        if own <= SHOWS * claim.rms(cell, coefficients).powi(2) {
+            // It does not show there, or is a constant that each run has of its own.
+            return !barely || self.problem.nuisances[cell].of_run.contains(&true);
         }
+        if barely { without - with > HOLDS_BARELY * own } else { without - with >= HOLDS * own }
     }
 
     /// The first rival of an effect that holds in its place.
@@ -116,7 +130,9 @@ impl HeldOut<'_> {
             let removes = |(without, with, own): (f64, f64, f64)| {
                 without - with >= INSTEAD * own.max(without - self.floors[cell].powi(2)) && own > 0.0
             };
+            let there = |other: &Sized| other.0.same_claim(&rival.candidate);
             rival.candidate.family.physics != UNMODELLED
+                && !all.iter().any(there)
                 && rival.score >= least
                 && rival.gain.least >= 0.5 * thresholds.nats
                 && self.without_and_with(all, k, claim, cell).is_some_and(removes)
@@ -126,13 +142,19 @@ impl HeldOut<'_> {
     /// Mean squares of what was held out in a cell of the fit: beside all effects but one, beside these and a claim in its place, and of the
     /// claim's own part.
     fn without_and_with(&self, all: &[Sized], k: usize, claim: Sized, cell: usize) -> Option<(f64, f64, f64)> {
-        let others: Vec<Sized> = all.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, one)| *one).collect();
-        let with: Vec<Sized> = others.iter().copied().chain([claim]).collect();
-        let beside = self.problem.nuisances[cell].estimate(&left(self.problem, cell, with.iter().copied()));
-        let (_, _, without) = self.corrected(&others, &beside, cell)?;
-        let (_, _, with) = self.corrected(&with, &beside, cell)?;
+        let (_, without, with) = self.beside(all, k, claim, cell)?;
         let square = |of: &dyn Fn(usize) -> f64| mean(&(0..with.len()).map(|i| of(i).powi(2)).collect::<Vec<_>>());
         Some((square(&|i| without[i]), square(&|i| with[i]), square(&|i| without[i] - with[i])))
+    }
+
+    /// What was held out in a cell of the fit, with its number there: beside all effects but one, and beside these and a claim in its place.
+    pub(crate) fn beside(&self, all: &[Sized], k: usize, claim: Sized, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
+        let others = others(all, k);
+        let with: Vec<Sized> = others.iter().copied().chain([claim]).collect();
+        let roughly = self.problem.nuisances[cell].estimate(&left(self.problem, cell, with.iter().copied()));
+        let (_, _, without) = self.corrected(&others, &roughly, cell)?;
+        let (c, _, with) = self.corrected(&with, &roughly, cell)?;
+        Some((c, without, with))
     }
 
     /// Residuals of a cell of what was held out, before and after the correction by some effects, beside the likeliest values of what is known

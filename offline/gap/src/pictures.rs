@@ -3,7 +3,7 @@
 use gap_report::{BeforeAfter, HeatMap, HeatRun, Pictures, Quantity, Share, Signature};
 
 use crate::analysis::Found;
-use crate::held_out::sized;
+use crate::held_out::{others, sized};
 use crate::hypothesis::Candidate;
 use crate::nominal::rms;
 use crate::problem::{Channel, Problem};
@@ -124,7 +124,7 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
     let own = &found.answer.effects[k].chosen.candidate;
     let (feature, x) = feature(found.problem, own, cell);
     // Only this effect: the others are taken off.
-    let others = sized(&found.answer.effects, found.estimates).into_iter().enumerate().filter(|(i, _)| *i != k).map(|(_, one)| one);
+    let others = others(&sized(&found.answer.effects, found.estimates), k).into_iter();
     let before = left(found.problem, cell, others);
     let effect = own.effect(cell, &found.estimates[k].coefficients);
     let after: Vec<f64> = before.iter().zip(&effect).map(|(y, p)| y - p).collect();

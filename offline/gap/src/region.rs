@@ -5,8 +5,8 @@ use arm::serial::Workspace;
 use gap_report::Region;
 
 use crate::analysis::Found;
-use crate::held_out::sized;
-use crate::hypothesis::{Candidate, Window};
+use crate::held_out::{others, sized};
+use crate::hypothesis::Window;
 use crate::problem::Problem;
 
 /// Share of the rows that each step takes off one side, and how much may be explained in them, of what is explained in as many on average:
@@ -117,8 +117,7 @@ fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f
 }
 
 fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
-    let others =
-        sized(&found.answer.effects, found.estimates).into_iter().enumerate().filter(|(k, _)| *k != effect).map(|(_, one)| one);
+    let others = others(&sized(&found.answer.effects, found.estimates), effect).into_iter();
     let without = crate::verdicts::left(found.problem, cell, others);
     let candidate = &found.answer.effects[effect].chosen.candidate;
     let own = candidate.effect(cell, &found.estimates[effect].coefficients);
@@ -126,19 +125,9 @@ fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Ro
 }
 
 fn held_out(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
-    let of = &found.problem.cells[cell];
-    let c = found.held.cell(of.channel, of.index)?;
-    let mut without = found.held.cells[c].residual.clone();
-    let mut own = Vec::new();
-    for (k, (one, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
-        let candidate = &one.chosen.candidate;
-        let there = Candidate::new(found.held_dictionary, &candidate.family, &candidate.shape, candidate.window);
-        if k == effect {
-            own = there.effect(c, &estimate.coefficients);
-        } else {
-            there.take_off(c, &estimate.coefficients, &mut without);
-        }
-    }
+    let all = sized(&found.answer.effects, found.estimates);
+    let (c, without, with) = found.held_out().beside(&all, effect, all[effect], cell)?;
+    let own: Vec<f64> = without.iter().zip(&with).map(|(without, with)| without - with).collect();
     rows(found.held, c, space, &without, &own, found.answer.effects[effect].chosen.candidate.window)
 }
 

@@ -329,7 +329,7 @@ fn error_of_sum(values: &[f64]) -> Option<f64> {
 
 /// Wilcoxon's signed ranks, in their standard deviations if signs were even.
 fn signed_ranks(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|x| *x != 0.0).collect();
     sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     let sum: f64 = sorted.iter().zip(1..).map(|(x, rank)| f64::from(rank) * x.signum()).sum();
     let n = sorted.len() as f64;
@@ -395,4 +395,19 @@ pub fn segments(problem: &Problem, cell: usize) -> Vec<std::ops::Range<usize>> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::signed_ranks;
+
+    #[test]
+    fn ranks_tell_how_many_blocks_agree_and_not_by_how_much() {
+        // All of eight: 36 / sqrt(8 * 9 * 17 / 6).
+        let all = 36.0 / 204.0_f64.sqrt();
+        assert!((signed_ranks(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 1e6]) - all).abs() < 1e-12);
+        assert!((signed_ranks(&[1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, -1e6]) - 20.0 / 204.0_f64.sqrt()).abs() < 1e-12);
+        assert!(signed_ranks(&[1.0, -1.1, 1.2, -1.3]).abs() < 0.5);
+        assert!(signed_ranks(&[]).abs() < 1e-12);
+    }
 }

@@ -42,12 +42,12 @@ const EDGES: usize = 12;
 const ALWAYS: [&str; 1] = ["stribeck_friction"];
 /// What a delay in a window pays more than others, nats: a little lateness passes for the last of what a motion's middle leaves.
 const LATE_IN_A_WINDOW: f64 = 25.0;
-/// Times its standard error over the blocks that the gain of an effect has to reach, or the squared error that it explains,
+/// Times its standard error over the blocks that the gain of an effect has to reach, or the ranks of the blocks theirs, which the largest
+/// block does not sway; or the squared error that it explains,
 const SEEN_OFTEN: f64 = 2.0;
 const EXPLAINED_OFTEN: f64 = 3.0;
-/// or the ranks of its blocks, which the largest one does not sway;
-/// nats without the block that says most that are enough for what is there so shortly that blocks cannot be told apart, if it is said in
-/// few numbers and nothing else is said,
+/// but for what is there so shortly that blocks cannot be told apart: there as many nats without the block that says most are enough, if it has
+/// few coefficients and nothing else is said,
 const SURE: f64 = 36.0;
 const FEW: usize = 2;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
@@ -103,6 +103,8 @@ pub struct Effect {
     pub gain: Gain,
     /// Largest share of a cell's squared error that it removes beside the others.
     pub share: f64,
+    /// Was it taken in place of what fits better, and is not acceptable or does not hold on what was held out?
+    pub second: bool,
 }
 
 impl Effect {
@@ -151,11 +153,12 @@ impl Answer<'_> {
         taken
     }
 
-    /// Takes a rival of an effect in its place. What was chosen is no longer among the rivals.
+    /// Takes a rival of an effect in its place. What was chosen, and what stood before the rival, is no longer among its own rivals.
     pub fn exchange(&mut self, effect: usize, rival: usize) {
-        let rival = self.effects[effect].rivals.remove(rival);
+        let Some(rival) = self.effects[effect].rivals.drain(..=rival).next_back() else { return };
         self.effects[effect].gain = rival.gain;
         self.effects[effect].chosen = rival;
+        self.effects[effect].second = true;
         self.fit_anew();
         let base = self.grams_of(|k| k != effect);
         let before = self.scorer.fit(&base);
@@ -387,10 +390,17 @@ impl Search<'_, '_> {
                 let mut ranked = self.rank(&others);
                 // Claims that stand beside are not also rivals.
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
-                let Some(best) = ranked.first().cloned() else { continue };
+                let Some(first) = ranked.first() else { continue };
+                // What was accepted may stand behind what is not acceptable.
+                let own = ranked.iter().find(|r| r.candidate.same_claim(&chosen[k]));
+                let stands = |own: &&Scored| own.score >= self.thresholds.nats && !own.candidate.same_claim(&first.candidate);
+                let tried = [Some(first), own.filter(stands)];
+                let tried = tried.into_iter().flatten().map(|one| (one.clone(), self.judged(&base, &others, one)));
+                let tried: Vec<(Scored, Judged)> = tried.collect();
+                let accepted = tried.iter().find(|(one, judged)| self.accepts(one, judged));
+                let (best, judged) = accepted.unwrap_or(&tried[0]).clone();
                 let swapped = !best.candidate.same_claim(&chosen[k]);
-                let judged = self.judged(&base, &others, &best);
-                if !self.accepts(&best, &judged) {
+                if accepted.is_none() {
                     trace(format!("  dropped {} {judged:.2?}", describe(&best)));
                     *chosen = others;
                     continue 'again;
@@ -402,8 +412,10 @@ impl Search<'_, '_> {
                     continue 'again;
                 }
                 chosen[k] = best.candidate.clone();
-                let rivals = ranked.into_iter().skip(1).collect();
-                effects.push(Effect { chosen: best, rivals, gain: judged.gain, share: judged.share });
+                // What stands before it is not acceptable, and no rival.
+                let place = ranked.iter().position(|r| r.candidate.same_claim(&best.candidate)).unwrap_or(0);
+                let rivals = ranked.into_iter().skip(place + 1).collect();
+                effects.push(Effect { chosen: best, rivals, gain: judged.gain, share: judged.share, second: place > 0 });
             }
             effects.reverse();
             return effects;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::dictionary::Dictionary;
 use super::{Bound, Family, product};
 use crate::linear::dot;
-use crate::problem::Channel;
+use crate::problem::{Channel, Pair};
 
 const PHYSICS: &str = "cable_hysteresis";
 /// Bouc-Wen, the cable as stiff as in the simulation.
@@ -92,7 +92,8 @@ pub(super) fn push(dictionary: &Dictionary, j: usize, usual: f64, all: &mut Vec<
 
 /// The runs that an element is fitted to, in each of which its memory starts with a number of its own.
 struct Starts {
-    runs: Vec<String>,
+    /// By name and time: what is held out may be a later part of the same run.
+    runs: Vec<(String, f64)>,
     /// Loads of the cable where they begin; 0 of a run without rows.
     first: Vec<f64>,
 }
@@ -102,7 +103,7 @@ impl Starts {
     fn new(dictionary: &Dictionary, j: usize) -> Self {
         let load = dictionary.cable_load(j);
         let first = parts(dictionary, &load).map(|run| run.first().copied().unwrap_or(0.0)).collect();
-        Self { runs: dictionary.problem.pairs.iter().map(|pair| pair.real.run.id.clone()).collect(), first }
+        Self { runs: dictionary.problem.pairs.iter().map(of_run).collect(), first }
     }
 
     /// Elements with what they may hold at the start of each run.
@@ -122,7 +123,7 @@ impl Starts {
     /// leaves in a new element.
     fn held(&self, dictionary: &Dictionary, run: usize, load: &[f64], shape: &[f64]) -> f64 {
         let (element, starts) = shape.split_at(ELEMENT);
-        if self.runs.get(run) == Some(&dictionary.problem.pairs[run].real.run.id) {
+        if self.runs.get(run) == Some(&of_run(&dictionary.problem.pairs[run])) {
             return starts[run];
         }
         let of_fitted: Vec<f64> = self.first.iter().map(|load| of_new(*load, element)).collect();
@@ -135,6 +136,11 @@ impl Starts {
         let of_run = |(r, run): (usize, &[f64])| bouc_wen(run, shape, self.held(dictionary, r, run, shape));
         parts(dictionary, load).enumerate().flat_map(of_run).collect()
     }
+}
+
+/// Name and beginning of a run.
+fn of_run(pair: &Pair) -> (String, f64) {
+    (pair.real.run.id.clone(), pair.real.run.since_s)
 }
 
 /// A grid series, run by run.
