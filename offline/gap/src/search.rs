@@ -222,7 +222,7 @@ pub fn search<'p>(
         let ranked = search.rank(&chosen);
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
         let mut accepted = None;
-        for scored in to_judge(ranked) {
+        for scored in to_judge(&ranked) {
             let judged = search.judged(&base, &chosen, &scored);
             trace(format!("  judged: {} {judged:.2?}", describe(&scored)));
             if search.accepts(&scored, &judged) {
@@ -628,7 +628,7 @@ const BORNE_OUT: f64 = 0.5;
 /// The claims that are judged, in this order: the first ones, and those that gain most however much they pay. Where the best one leaves much
 /// that is not independent from row to row, as one of two effects does, prices weigh more than all gains, and what explains nothing but
 /// costs nothing stands first.
-fn to_judge(ranked: Vec<Scored>) -> Vec<Scored> {
+fn to_judge(ranked: &[Scored]) -> Vec<Scored> {
     let mut by_gain: Vec<usize> = (0..ranked.len()).collect();
     by_gain.sort_by(|a, b| ranked[*b].gain.nats.total_cmp(&ranked[*a].gain.nats));
     let first = (0..ranked.len()).take(JUDGED);
