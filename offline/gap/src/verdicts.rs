@@ -141,7 +141,12 @@ pub(crate) fn outcome(
         let next = found.answer.next.as_ref();
         let nats = next.map_or(0.0, |n| n.gain.nats);
         let claim = next.map_or("no hypothesis explains anything".to_owned(), |n| {
-            format!("the best of all hypotheses, {}, gains less than is asked for", n.candidate.family.physics.replace('_', " "))
+            let why = if nats < thresholds.nats {
+                "gains less than is asked for"
+            } else {
+                "does not hold on what was held out, or not often enough"
+            };
+            format!("the best of all hypotheses, {}, {why}", n.candidate.family.physics.replace('_', " "))
         });
         let evidence = Evidence::new("search of the whole library", claim, (nats, "nats"), TestMethod::HeldOutGain);
         let probability = 1.0 / (1.0 + ((nats - thresholds.nats) / 2.0).exp());
