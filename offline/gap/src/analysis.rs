@@ -386,7 +386,7 @@ fn analyse_with(
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {
-            crate::nominal::rms(verdicts::left(&problem, c, sized(&answer.effects, &estimates).into_iter()).into_iter())
+            crate::nominal::rms(verdicts::left(&problem, c, &sized(&answer.effects, &estimates)).into_iter())
                 >= problem.practical.any[c]
         })
         && beyond > 2.0 * options.thresholds.nats

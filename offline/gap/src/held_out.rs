@@ -34,7 +34,7 @@ pub(crate) struct HeldOut<'a> {
 }
 
 /// A claim with its coefficients.
-type Sized<'a> = (&'a Candidate, &'a [f64]);
+pub(crate) type Sized<'a> = (&'a Candidate, &'a [f64]);
 
 /// The chosen ones of effects, with their sizes.
 pub(crate) fn sized<'a>(effects: &'a [Effect], estimates: &'a [Estimate]) -> Vec<Sized<'a>> {
@@ -151,7 +151,7 @@ impl HeldOut<'_> {
     pub(crate) fn beside(&self, all: &[Sized], k: usize, claim: Sized, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
         let others = others(all, k);
         let with: Vec<Sized> = others.iter().copied().chain([claim]).collect();
-        let roughly = self.problem.nuisances[cell].estimate(&left(self.problem, cell, with.iter().copied()));
+        let roughly = self.problem.nuisances[cell].estimate(&left(self.problem, cell, &with));
         let (_, _, without) = self.corrected(&others, &roughly, cell)?;
         let (c, _, with) = self.corrected(&with, &roughly, cell)?;
         Some((c, without, with))

@@ -124,8 +124,8 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
     let own = &found.answer.effects[k].chosen.candidate;
     let (feature, x) = feature(found.problem, own, cell);
     // Only this effect: the others are taken off.
-    let others = others(&sized(&found.answer.effects, found.estimates), k).into_iter();
-    let before = left(found.problem, cell, others);
+    let others = others(&sized(&found.answer.effects, found.estimates), k);
+    let before = left(found.problem, cell, &others);
     let effect = own.effect(cell, &found.estimates[k].coefficients);
     let after: Vec<f64> = before.iter().zip(&effect).map(|(y, p)| y - p).collect();
     let every = (x.len() / 900).max(1);

@@ -117,8 +117,8 @@ fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f
 }
 
 fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
-    let others = others(&sized(&found.answer.effects, found.estimates), effect).into_iter();
-    let without = crate::verdicts::left(found.problem, cell, others);
+    let others = others(&sized(&found.answer.effects, found.estimates), effect);
+    let without = crate::verdicts::left(found.problem, cell, &others);
     let candidate = &found.answer.effects[effect].chosen.candidate;
     let own = candidate.effect(cell, &found.estimates[effect].coefficients);
     rows(found.problem, cell, space, &without, &own, candidate.window)

@@ -223,13 +223,13 @@ pub fn search<'p>(
         ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
         let mut accepted = None;
         for scored in to_judge(&ranked) {
-            let judged = search.judged(&base, &chosen, &scored);
-            trace(format!("  judged: {} {judged:.2?}", describe(&scored)));
-            if search.accepts(&scored, &judged) {
-                accepted = Some(scored);
+            let judged = search.judged(&base, &chosen, scored);
+            trace(format!("  judged: {} {judged:.2?}", describe(scored)));
+            if search.accepts(scored, &judged) {
+                accepted = Some(scored.clone());
                 break;
             }
-            next = next.or(Some(scored));
+            next = next.or_else(|| Some(scored.clone()));
         }
         let Some(best) = accepted else { break };
         next = None;
@@ -343,11 +343,10 @@ impl Search<'_, '_> {
         // In a window it is met for as long as that lasts; a wall is met seldom all the same.
         let family = &scored.candidate.family;
         let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
-        let often = judged.gain.ranks > SEEN_OFTEN;
         let short = alone && scored.candidate.edges() > 0 && scored.candidate.columns.len() <= FEW && judged.gain.least > SURE;
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
-            && (seldom || judged.gain.nats > SEEN_OFTEN * judged.gain.error || is_uneven(&judged.gain) || often || short)
+            && (is_met_often(&judged.gain) || seldom || short)
             && judged.amplitude >= 0.0
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
@@ -391,20 +390,22 @@ impl Search<'_, '_> {
                 // Claims that stand beside are not also rivals.
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
                 let Some(first) = ranked.first() else { continue };
+                let judged = self.judged(&base, &others, first);
+                let mut accepted = self.accepts(first, &judged).then(|| (first.clone(), judged));
                 // What was accepted may stand behind what is not acceptable.
-                let own = ranked.iter().find(|r| r.candidate.same_claim(&chosen[k]));
-                let stands = |own: &&Scored| own.score >= self.thresholds.nats && !own.candidate.same_claim(&first.candidate);
-                let tried = [Some(first), own.filter(stands)];
-                let tried = tried.into_iter().flatten().map(|one| (one.clone(), self.judged(&base, &others, one)));
-                let tried: Vec<(Scored, Judged)> = tried.collect();
-                let accepted = tried.iter().find(|(one, judged)| self.accepts(one, judged));
-                let (best, judged) = accepted.unwrap_or(&tried[0]).clone();
-                let swapped = !best.candidate.same_claim(&chosen[k]);
-                if accepted.is_none() {
-                    trace(format!("  dropped {} {judged:.2?}", describe(&best)));
+                let own = || ranked.iter().skip(1).find(|r| r.candidate.same_claim(&chosen[k]) && r.score >= self.thresholds.nats);
+                if accepted.is_none()
+                    && let Some(own) = own()
+                {
+                    let judged = self.judged(&base, &others, own);
+                    accepted = self.accepts(own, &judged).then(|| (own.clone(), judged));
+                }
+                let Some((best, judged)) = accepted else {
+                    trace(format!("  dropped {} {judged:.2?}", describe(first)));
                     *chosen = others;
                     continue 'again;
-                }
+                };
+                let swapped = !best.candidate.same_claim(&chosen[k]);
                 if swapped && sweep < 4 {
                     trace(format!("  swapped for {}", describe(&best)));
                     chosen[k] = best.candidate;
@@ -628,12 +629,11 @@ const BORNE_OUT: f64 = 0.5;
 /// The claims that are judged, in this order: the first ones, and those that gain most however much they pay. Where the best one leaves much
 /// that is not independent from row to row, as one of two effects does, prices weigh more than all gains, and what explains nothing but
 /// costs nothing stands first.
-fn to_judge(ranked: &[Scored]) -> Vec<Scored> {
+fn to_judge(ranked: &[Scored]) -> Vec<&Scored> {
     let mut by_gain: Vec<usize> = (0..ranked.len()).collect();
     by_gain.sort_by(|a, b| ranked[*b].gain.nats.total_cmp(&ranked[*a].gain.nats));
     let first = (0..ranked.len()).take(JUDGED);
-    let order: Vec<usize> = first.chain(by_gain.into_iter().take(JUDGED).filter(|k| *k >= JUDGED)).collect();
-    order.into_iter().map(|k| ranked[k].clone()).collect()
+    first.chain(by_gain.into_iter().take(JUDGED).filter(|k| *k >= JUDGED)).map(|k| &ranked[k]).collect()
 }
 
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
@@ -661,6 +661,11 @@ fn price(candidate: &Candidate) -> f64 {
     let edges = candidate.edges().min(2);
     let late = edges > 0 && candidate.family.physics == "measurement_delay";
     candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
+}
+
+/// Does an effect show in more than a block or two: in their gains, their ranks, or the squared error that each explains?
+fn is_met_often(gain: &Gain) -> bool {
+    gain.nats > SEEN_OFTEN * gain.error || gain.ranks > SEEN_OFTEN || is_uneven(gain)
 }
 
 /// Is an effect accepted for what each block explains, though its gain is that of a few?

@@ -12,7 +12,7 @@ use gap_report::{
 use crate::analysis::{Found, Given, Options, Outcome};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
-use crate::held_out::{Refused, sized};
+use crate::held_out::{Refused, Sized, sized};
 use crate::hypothesis::{Candidate, UNMODELLED};
 use crate::intervals::{Edge, Estimate};
 use crate::nominal::rms;
@@ -437,12 +437,13 @@ pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, V
 
 /// Likeliest values of what is known only roughly beside all effects, per cell.
 pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
-    let left = |c: usize| left(problem, c, sized(effects, estimates).into_iter());
+    let all = sized(effects, estimates);
+    let left = |c: usize| left(problem, c, &all);
     (0..problem.cells.len()).map(|c| problem.nuisances[c].estimate(&left(c))).collect()
 }
 
 /// What effects leave of the residual of a cell.
-pub(crate) fn left<'e>(problem: &Problem, c: usize, effects: impl Iterator<Item = (&'e Candidate, &'e [f64])>) -> Vec<f64> {
+pub(crate) fn left(problem: &Problem, c: usize, effects: &[Sized]) -> Vec<f64> {
     let mut left = problem.cells[c].residual.clone();
     for (candidate, coefficients) in effects {
         candidate.take_off(c, coefficients, &mut left);
