@@ -248,16 +248,29 @@ impl<E: Estimator> Cycle<E> {
         self.pending = true;
     }
 
-    /// While nothing has arrived: keeps warm what answers the connected arms, one piece of one arm per call. Changes no answer.
-    pub fn keep_warm(&mut self) {
-        let (round, place) = (self.warm / PLACES, self.warm % PLACES);
-        self.warm = (self.warm + 1) % (PLACES * WARM_ROUNDS);
+    /// While nothing has arrived: keeps warm what answers the connected arms, one piece of one model per call. Changes no answer. Returns
+    /// whether that completes a round: so many pieces of each.
+    pub fn keep_warm(&mut self) -> bool {
+        let mut completes = false;
+        for _ in 0..PLACES {
+            let (round, place) = (self.warm / PLACES, self.warm % PLACES);
+            self.warm = (self.warm + 1) % (PLACES * WARM_ROUNDS);
+            completes |= self.warm == 0;
+            if self.warm_place(round, place) {
+                break;
+            }
+        }
+        completes
+    }
+
+    /// One piece of what answers a place; `false` where nothing does.
+    fn warm_place(&mut self, round: usize, place: usize) -> bool {
         let index = place % ARMS;
         let arm = &mut self.arms[index];
         let corrector = if place < ARMS { &mut arm.position } else { &mut arm.orientation };
-        let Some(model) = corrector.loaded_mut() else { return };
+        let Some(model) = corrector.loaded_mut() else { return false };
         if self.newest.connected() & (1 << index) == 0 {
-            return;
+            return false;
         }
         if round == 0 {
             features::extract(&self.newest, index, &mut self.features);
@@ -266,6 +279,7 @@ impl<E: Estimator> Cycle<E> {
         } else {
             model.estimator.keep_warm();
         }
+        true
     }
 
     fn begin_source(&mut self) {

@@ -295,13 +295,24 @@ impl<E: Estimator> Runner<E> {
     }
 
     fn poll_until(&mut self, deadline_ns: i64) {
+        self.prepare();
         // Bounded by the deadline, which is at most one period away.
         while !self.waiting_state() && now_ns() < deadline_ns {
-            self.prepare();
             if self.waiting.keep_warm {
-                self.cycle.keep_warm();
+                self.keep_warm();
+            } else {
+                std::hint::spin_loop();
             }
-            std::hint::spin_loop();
+        }
+    }
+
+    /// The models all the time, the way out once a round of them.
+    fn keep_warm(&mut self) {
+        if self.cycle.keep_warm()
+            && let Some(link) = &self.link
+        {
+            link.writer.prepare();
+            link.writer.keep_warm();
         }
     }
 

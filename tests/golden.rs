@@ -69,8 +69,8 @@ fn keeping_weights_warm_changes_no_output() {
     for mut plan in every_plan(&network) {
         let mut expected = [0.0_f32; 3];
         plan.run(&[0.25; 118], &mut expected);
-        // More than once round: 8 KiB each time.
-        for _ in 0..plan.bytes() / 4096 + 8 {
+        // More than once round: 16 KiB each time.
+        for _ in 0..plan.bytes() / 8192 + 8 {
             plan.keep_warm();
         }
         let mut found = [0.0_f32; 3];

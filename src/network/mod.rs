@@ -37,8 +37,8 @@ const SMALLEST_WEIGHT: f32 = 1e-30;
 #[cfg(target_arch = "x86_64")]
 const TILES_INPUTS_MAX: usize = 65_000;
 
-/// Lines of weights that one call of [`Plan::keep_warm`] reads: 8 KiB, a fraction of a microsecond.
-const WARM_LINES: usize = 128;
+/// Lines of weights that one call of [`Plan::keep_warm`] reads: 16 KiB, half a microsecond.
+const WARM_LINES: usize = 256;
 
 /// A layer of fewer outputs takes no more room as float32 in groups of four rows than as numbers of 16 bits in a tile of sixteen, and loses
 /// nothing.
@@ -195,7 +195,7 @@ impl Plan {
         self.memory().map(<[u8]>::len).sum()
     }
 
-    /// Reads the next 8 KiB of the weights, round and round with each call. Called by whoever waits for an input, so that a run finds
+    /// Reads the next 16 KiB of the weights, round and round with each call. Called by whoever waits for an input, so that a run finds
     /// its weights in the caches and the vector unit awake: after a sleep neither is.
     pub fn keep_warm(&mut self) {
         let (layer, line) = self.warm;

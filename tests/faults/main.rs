@@ -8,4 +8,5 @@ mod memory;
 mod mix;
 mod orientation;
 mod rows;
+mod warm;
 mod world;

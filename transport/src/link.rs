@@ -205,6 +205,16 @@ impl<T: Message> Writer<T> {
         self.next.set(next);
     }
 
+    /// While there is nothing to send: goes the ways that sending goes, so that their code and what they read are near. Sending looks at the
+    /// places of all readers that may come, twice; so does taking a message. Readers that came meanwhile are connected here and now, not
+    /// while a message waits.
+    pub fn keep_warm(&self) {
+        // What fails here fails again, and is said, when sending.
+        let _ = self.publisher.update_connections();
+        // Given back at once.
+        drop(self.free());
+    }
+
     /// Takes a free message to write into, the prepared one if there is one. Nothing is visible to anybody before [`Loan::send`].
     ///
     /// # Errors
@@ -426,10 +436,14 @@ mod tests {
         }
     }
 
-    fn takes_no_more_room_than_it_asks_for<T: Message>() {
-        let name = format!("room{}_{}_", std::process::id(), T::MAX_READERS);
+    fn own(name: &str) -> Own {
+        let name = format!("{name}{}_", std::process::id());
         let root = std::env::temp_dir().join(format!("ravenpose-{name}"));
-        let own = Own(Settings { prefix: name, root: format!("{}/", root.display()) });
+        Own(Settings { prefix: name, root: format!("{}/", root.display()) })
+    }
+
+    fn takes_no_more_room_than_it_asks_for<T: Message>() {
+        let own = own(&format!("room{}_", T::MAX_READERS));
         let settings = &own.0;
         let writer = Writer::<T>::open(settings).expect("writer");
         let (alone, taken) = shared(&settings.prefix);
@@ -453,5 +467,26 @@ mod tests {
     #[test]
     fn poses_take_no_more_room_than_they_ask_for() {
         takes_no_more_room_than_it_asks_for::<CorrectedPose>();
+    }
+
+    #[test]
+    fn what_keeps_the_way_out_warm_is_seen_by_nobody_and_takes_no_place() {
+        let own = own("warm");
+        let writer = Writer::<RavenState>::open(&own.0).expect("writer");
+        let mut state = RavenState::new();
+        for sequence in 1..=3 {
+            // More often than there are places, with and without one taken beforehand; a reader that comes gets what was sent last.
+            for _ in 0..2 * LOANED_MAX * DEPTH_MAX {
+                writer.keep_warm();
+            }
+            writer.prepare();
+            let reader = Reader::<RavenState>::open(&own.0, 4).expect("reader");
+            writer.keep_warm();
+            let last = reader.latest().expect("nothing failed").map(|state| state.sequence);
+            assert_eq!(last, (sequence > 1).then_some(sequence - 1));
+            state.seal(sequence);
+            assert_eq!(writer.send(&state).expect("a place"), 1);
+            assert_eq!(reader.latest().expect("nothing failed").map(|state| state.sequence), Some(sequence));
+        }
     }
 }

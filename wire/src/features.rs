@@ -17,64 +17,48 @@ pub struct Block {
     pub count: usize,
     /// Unit as published.
     pub unit: &'static str,
-    copy: fn(&RavenState, usize, &mut [f32]),
 }
 
-macro_rules! block {
-    ($field:ident, $name:literal, $start:literal, $count:literal, $unit:literal) => {
-        Block {
-            field: $name,
-            start: $start,
-            count: $count,
-            unit: $unit,
-            copy: |state, arm, out| {
-                let from = &state.$field[arm * $count..(arm + 1) * $count];
-                for (to, from) in out.iter_mut().zip(from) {
+/// The table, and straight code out of it: a loop over the table would call through 18 pointers in each cycle.
+macro_rules! layout {
+    ($($field:ident, $name:literal, $start:literal, $count:literal, $unit:literal;)*) => {
+        /// The layout, in feature order. Values exactly as published, as `f32`; nothing is converted before the network.
+        pub static BLOCKS: [Block; 18] = [
+            $(Block { field: $name, start: $start, count: $count, unit: $unit },)*
+            Block { field: "dt", start: DT, count: 1, unit: "s" },
+        ];
+
+        /// Fills the features of one arm (0 gold, 1 green).
+        pub fn extract(state: &RavenState, arm: usize, features: &mut [f32; FEATURES]) {
+            $(
+                let from = &state.$field.as_chunks::<$count>().0[arm];
+                for (to, from) in features[$start..$start + $count].iter_mut().zip(from) {
                     *to = *from as f32;
                 }
-            },
+            )*
+            features[DT] = (f64::from(state.dt_sec) + f64::from(state.dt_nsec) * 1e-9) as f32;
         }
     };
 }
 
-/// The layout, in feature order. Values exactly as published, as `f32`; nothing is converted before the network.
-pub static BLOCKS: [Block; 18] = [
-    block!(pos, "pos", 0, 3, "um"),
-    block!(pos_d, "pos_d", 3, 3, "um"),
-    block!(ori, "ori", 6, 9, "1"),
-    block!(ori_d, "ori_d", 15, 9, "1"),
-    block!(enc_vals, "encVals", 24, 8, "counts"),
-    block!(dac_val, "dac_val", 32, 8, "counts"),
-    block!(tau, "tau", 40, 8, "N m"),
-    block!(mpos, "mpos", 48, 8, "deg"),
-    block!(jpos, "jpos", 56, 8, "deg; joint 3: m x 57.29578"),
-    block!(mvel, "mvel", 64, 8, "deg/s"),
-    block!(jvel, "jvel", 72, 8, "deg/s; joint 3: m/s x 57.29578"),
-    block!(mpos_d, "mpos_d", 80, 8, "deg"),
-    block!(jpos_d, "jpos_d", 88, 8, "deg; joint 3: m x 57.29578"),
-    block!(grasp_d, "grasp_d", 96, 1, "rad"),
-    block!(encoffsets, "encoffsets", 97, 8, "counts"),
-    block!(jac_vel, "jac_vel", 105, 6, "-"),
-    block!(jac_f, "jac_f", 111, 6, "-"),
-    Block {
-        field: "dt",
-        start: DT,
-        count: 1,
-        unit: "s",
-        copy: |state, _, out| {
-            if let Some(to) = out.first_mut() {
-                *to = (f64::from(state.dt_sec) + f64::from(state.dt_nsec) * 1e-9) as f32;
-            }
-        },
-    },
-];
-
-/// Fills the features of one arm (0 gold, 1 green).
-pub fn extract(state: &RavenState, arm: usize, features: &mut [f32; FEATURES]) {
-    debug_assert!(arm < crate::ARMS);
-    for block in &BLOCKS {
-        (block.copy)(state, arm, &mut features[block.start..block.start + block.count]);
-    }
+layout! {
+    pos, "pos", 0, 3, "um";
+    pos_d, "pos_d", 3, 3, "um";
+    ori, "ori", 6, 9, "1";
+    ori_d, "ori_d", 15, 9, "1";
+    enc_vals, "encVals", 24, 8, "counts";
+    dac_val, "dac_val", 32, 8, "counts";
+    tau, "tau", 40, 8, "N m";
+    mpos, "mpos", 48, 8, "deg";
+    jpos, "jpos", 56, 8, "deg; joint 3: m x 57.29578";
+    mvel, "mvel", 64, 8, "deg/s";
+    jvel, "jvel", 72, 8, "deg/s; joint 3: m/s x 57.29578";
+    mpos_d, "mpos_d", 80, 8, "deg";
+    jpos_d, "jpos_d", 88, 8, "deg; joint 3: m x 57.29578";
+    grasp_d, "grasp_d", 96, 1, "rad";
+    encoffsets, "encoffsets", 97, 8, "counts";
+    jac_vel, "jac_vel", 105, 6, "-";
+    jac_f, "jac_f", 111, 6, "-";
 }
 
 /// Field and index within the arm of a feature, as `jpos[2]`.
