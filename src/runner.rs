@@ -296,7 +296,7 @@ impl<E: Estimator> Runner<E> {
 
     fn poll_until(&mut self, deadline_ns: i64) {
         self.prepare();
-        // Bounded by the deadline, which is at most one period away.
+        // Bounded by the deadline, at most one period away, but for a reader that comes: connecting it takes the system's time, as in sending.
         while !self.waiting_state() && now_ns() < deadline_ns {
             if self.waiting.keep_warm {
                 self.keep_warm();
@@ -306,7 +306,7 @@ impl<E: Estimator> Runner<E> {
         }
     }
 
-    /// The models all the time, the way out once a round of them.
+    /// The models all the time, the way out once per round of their pieces.
     fn keep_warm(&mut self) {
         if self.cycle.keep_warm()
             && let Some(link) = &self.link

@@ -206,12 +206,12 @@ impl<T: Message> Writer<T> {
     }
 
     /// While there is nothing to send: goes the ways that sending goes, so that their code and what they read are near. Sending looks at the
-    /// places of all readers that may come, twice; so does taking a message. Readers that came meanwhile are connected here and now, not
-    /// while a message waits.
+    /// places of all readers that may come, twice; so does taking a message. Readers that came meanwhile are connected here and now, most
+    /// of them not while a message waits.
     pub fn keep_warm(&self) {
-        // What fails here fails again, and is said, when sending.
+        // As when sending: a reader that cannot be connected is left out until readers come or go again, and iceoryx2 tells nobody.
         let _ = self.publisher.update_connections();
-        // Given back at once.
+        // Given back at once. That there is none is said when sending.
         drop(self.free());
     }
 
@@ -475,11 +475,15 @@ mod tests {
         let writer = Writer::<RavenState>::open(&own.0).expect("writer");
         let mut state = RavenState::new();
         for sequence in 1..=3 {
-            // More often than there are places, with and without one taken beforehand; a reader that comes gets what was sent last.
-            for _ in 0..2 * LOANED_MAX * DEPTH_MAX {
-                writer.keep_warm();
+            // More often than there are places, without and with one taken beforehand; a reader that comes gets what was sent last.
+            for prepared in [false, true] {
+                if prepared {
+                    writer.prepare();
+                }
+                for _ in 0..2 * RavenState::MAX_READERS * DEPTH_MAX {
+                    writer.keep_warm();
+                }
             }
-            writer.prepare();
             let reader = Reader::<RavenState>::open(&own.0, 4).expect("reader");
             writer.keep_warm();
             let last = reader.latest().expect("nothing failed").map(|state| state.sequence);
