@@ -1,9 +1,8 @@
 //! What is kept warm while nothing arrives.
 
-use crate::world::{self, MS};
-use ravenpose::correction::{ArmModel, Estimator, Model};
+use crate::world::{self, BOUND_UM, MS};
+use ravenpose::correction::{ArmModel, Estimator};
 use ravenpose::cycle::{Cycle, Limits};
-use ravenpose::guard::{Allowed, Guard};
 use ravenpose_wire::{CorrectedPose, FEATURES};
 use std::cell::Cell;
 use std::rc::Rc;
@@ -22,17 +21,7 @@ impl Estimator for Counting {
 }
 
 fn counted(kept: &Rc<Cell<u32>>) -> ArmModel<Counting> {
-    let (guard, allowed) = (Guard::new(None), Allowed::default());
-    ArmModel::Loaded(Box::new(Model {
-        estimator: Counting(kept.clone()),
-        guard,
-        allowed,
-        id: 1,
-        bound: 8000.0,
-        bound95: [f64::NAN; 3],
-        bound95_unsettled: [f64::NAN; 3],
-        untrained: false,
-    }))
+    world::model_of(Counting(kept.clone()), 1, BOUND_UM, [300.0, 400.0, 500.0])
 }
 
 /// Rounds completed in so many calls, after a state of these arms.

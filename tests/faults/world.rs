@@ -81,7 +81,8 @@ pub(crate) fn turning() -> ArmModel<Fake> {
     model_of(Fake { turns: true, ..Fake::default() }, 0xfedc_ba98_7654_3210, BOUND_DEG, [0.3, 0.4, 0.5])
 }
 
-fn model_of(estimator: Fake, id: u64, bound: f64, bound95: [f64; 3]) -> ArmModel<Fake> {
+/// A model that is asked whatever a robot can do.
+pub(crate) fn model_of<E>(estimator: E, id: u64, bound: f64, bound95: [f64; 3]) -> ArmModel<E> {
     let (guard, allowed, bound95_unsettled) = (Guard::new(None), Allowed::default(), [f64::NAN; 3]);
     ArmModel::Loaded(Box::new(Model { estimator, guard, allowed, id, bound, bound95, bound95_unsettled, untrained: false }))
 }
