@@ -24,6 +24,7 @@ pub mod analysis;
 mod breakaway;
 pub mod builtin;
 mod channels;
+mod clock;
 mod closed_loop;
 mod comparable;
 pub mod controller;
