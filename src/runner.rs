@@ -412,11 +412,12 @@ impl<E: Estimator> Runner<E> {
             self.seen.refused = counters.refused;
             self.report(Event::Refused { total: counters.refused });
         }
-        let failures = self.link_counters.receive_failures + self.link_counters.send_failures;
+        self.link_counters.readers_left_out += self.link.as_ref().map_or(0, |link| link.writer.take_left_out());
+        let LinkCounters { receive_failures: receive, send_failures: send, readers_left_out: readers, .. } = self.link_counters;
+        let failures = receive + send + readers;
         if failures != self.seen.link_failures {
             self.seen.link_failures = failures;
-            let (receive, send) = (self.link_counters.receive_failures, self.link_counters.send_failures);
-            self.report(Event::Link { receive, send });
+            self.report(Event::Link { receive, send, readers });
         }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 /// Events that fit into the ring; what comes while it is full is counted and dropped.
 const EVENTS: usize = 256;
 /// Names of the counters, in the order of [`Shared::counters`].
-pub const COUNTER_NAMES: [&str; 14] = [
+pub const COUNTER_NAMES: [&str; 15] = [
     "cycles",
     "accepted",
     "published",
@@ -22,6 +22,7 @@ pub const COUNTER_NAMES: [&str; 14] = [
     "overruns",
     "receive_failures",
     "send_failures",
+    "readers_left_out",
     "events_dropped",
 ];
 
@@ -46,6 +47,8 @@ pub struct LinkCounters {
     pub receive_failures: u64,
     /// A pose could not be handed over.
     pub send_failures: u64,
+    /// A reader could not be connected: it gets no pose.
+    pub readers_left_out: u64,
     /// Events that found the ring full.
     pub events_dropped: u64,
 }
@@ -67,6 +70,7 @@ impl Shared {
             cycle.overruns,
             link.receive_failures,
             link.send_failures,
+            link.readers_left_out,
             link.events_dropped,
         ];
         for (to, from) in self.counters.iter().zip(values) {
@@ -139,6 +143,8 @@ pub enum Event {
         receive: u64,
         /// Failures to send so far.
         send: u64,
+        /// Failures to connect a reader so far.
+        readers: u64,
     },
     /// The link was opened anew.
     Reopened,

@@ -308,7 +308,9 @@ fn describe(event: &Event) -> String {
             format!("messages refused (other layout, torn, or not on this machine's CLOCK_MONOTONIC); {total} in all")
         }
         Event::Late { took_ns, sequence } => format!("state {sequence} took {:.1} us, beyond the budget", took_ns as f64 / 1000.0),
-        Event::Link { receive, send } => format!("link failures: {receive} receiving, {send} sending"),
+        Event::Link { receive, send, readers } => {
+            format!("link failures: {receive} receiving, {send} sending, {readers} connecting a reader, which gets no pose")
+        }
         Event::Reopened => "the link was opened anew".to_owned(),
     }
 }

@@ -28,10 +28,22 @@ const NETWORK: [(&str, f64); 5] = [
     ("network-i8", 144_770.0),
 ];
 const TOLERANCE: f64 = 0.02;
-/// Cycles of the shorter and of the longer run; the rest of both is the same.
-const RUNS: [usize; 2] = [20, 220];
+/// Cycles that are counted, after some that are not.
+const COUNTED: usize = 200;
+const BEFORE: usize = 20;
 
-fn part(name: &str, runs: usize) {
+/// What valgrind looks for: it counts in here only.
+#[inline(never)]
+fn counted_cycles(cycles: std::ops::Range<usize>, cycle: &mut dyn FnMut(usize)) {
+    cycles.for_each(cycle);
+}
+
+fn cycles(mut cycle: impl FnMut(usize)) {
+    (0..BEFORE).for_each(&mut cycle);
+    counted_cycles(BEFORE..BEFORE + COUNTED, &mut cycle);
+}
+
+fn part(name: &str) {
     if let Some(format) = name.strip_prefix("network-") {
         let format: Format = format.parse().expect("a format");
         // Reading a model from its file would take valgrind a minute.
@@ -39,47 +51,46 @@ fn part(name: &str, runs: usize) {
         let network = Network::dense(&[118, 600, 500, 400, 3], Activation::Sigmoid, weight);
         let mut plan = Plan::with(&network, InstructionSet::Avx2, format);
         let mut output = [0.0_f32; 3];
-        for run in 0..runs {
-            plan.run(&[run as f32; 118], &mut output);
-        }
+        cycles(|run| plan.run(&[run as f32; 118], &mut output));
         std::hint::black_box(output);
     } else {
-        let states: Vec<RavenState> = (1..=RUNS[1] as u64).map(|step| world::state(7, step, step, step as i64 * MS)).collect();
+        let states: Vec<RavenState> =
+            (1..=(BEFORE + COUNTED) as u64).map(|step| world::state(7, step, step, step as i64 * MS)).collect();
         let mut cycle = match name {
             "loop" => Cycle::new(Limits::default(), [world::model(), world::model()], false, 0),
             _ => world::cycle(Limits::default()),
         };
         let mut pose = CorrectedPose::new();
-        for state in &states[..runs] {
-            let now = state.source_time_ns;
-            cycle.offer(state, now);
+        cycles(|run| {
+            let now = states[run].source_time_ns;
+            cycle.offer(&states[run], now);
             assert!(cycle.step(now, &mut (), &mut pose));
             cycle.finish(now + 40_000, false, &mut pose);
-        }
+        });
         std::hint::black_box(&pose);
     }
 }
 
-/// Instructions of this test as a process of its own with a part to play.
-fn count(name: &str, runs: usize) -> Option<f64> {
+/// Instructions per cycle of a part, which this test plays as a process of its own.
+fn count(name: &str) -> Option<f64> {
     let this = std::env::current_exe().expect("this program");
     let output = Command::new("valgrind")
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*counted_cycles*"])
         .arg(this)
         .args(["--exact", "a_cycle_takes_the_instructions_that_it_took", "--test-threads=1"])
-        .env("RAVENPOSE_COUNT_PART", format!("{name} {runs}"))
+        .env("RAVENPOSE_COUNT_PART", name)
         .output()
         .ok()?;
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{words}");
-    words.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
+    let collected: f64 = words.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())?;
+    Some(collected / COUNTED as f64)
 }
 
 #[test]
 fn a_cycle_takes_the_instructions_that_it_took() {
     if let Ok(wanted) = std::env::var("RAVENPOSE_COUNT_PART") {
-        let (name, runs) = wanted.split_once(' ').expect("a part and a number");
-        return part(name, runs.parse().expect("a number"));
+        return part(&wanted);
     }
     let version = Command::new("rustc").arg("--version").output().map(|output| output.stdout).unwrap_or_default();
     if !String::from_utf8_lossy(&version).starts_with(COMPILER) {
@@ -88,16 +99,14 @@ fn a_cycle_takes_the_instructions_that_it_took() {
     if InstructionSet::Avx2.available() != InstructionSet::Avx2 {
         return println!("skipped: instructions were counted with AVX2");
     }
-    for (name, expected) in [("loop", LOOP), ("both", BOTH)].into_iter().chain(NETWORK) {
-        // Counts do not depend on what else runs.
-        let (many, few) = std::thread::scope(|scope| {
-            let few = scope.spawn(|| count(name, RUNS[0]));
-            (count(name, RUNS[1]), few.join().expect("counted"))
-        });
-        let (Some(many), Some(few)) = (many, few) else {
-            return println!("skipped: valgrind is absent");
-        };
-        let found = (many - few) / (RUNS[1] - RUNS[0]) as f64;
+    let parts: Vec<(&str, f64)> = [("loop", LOOP), ("both", BOTH)].into_iter().chain(NETWORK).collect();
+    // Counts do not depend on what else runs.
+    let counts: Vec<Option<f64>> = std::thread::scope(|scope| {
+        let begun: Vec<_> = parts.iter().map(|(name, _)| scope.spawn(|| count(name))).collect();
+        begun.into_iter().map(|counted| counted.join().expect("counted")).collect()
+    });
+    for ((name, expected), found) in parts.into_iter().zip(counts) {
+        let Some(found) = found else { return println!("skipped: valgrind is absent") };
         println!("{name}: {found:.0} instructions per cycle, {expected} noted");
         assert!((found / expected - 1.0).abs() <= TOLERANCE, "{name}: {found:.0} instructions per cycle, {expected} noted");
     }

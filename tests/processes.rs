@@ -421,10 +421,64 @@ fn readers_that_never_read_cost_the_loop_nothing() {
         // The idle ones hold the newest 64, the oldest were overwritten.
         let kept = idle[0].drain(|_| {}).expect("queue");
         assert_eq!(kept, 64);
-        let stats = std::fs::read(world.dir.0.join("run/stats.json")).expect("statistics");
-        let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
-        let failures = stats.counters.iter().find(|counter| counter.name == "send_failures").expect("counter");
-        assert_eq!(failures.value, 0);
+        assert_eq!(counter(&world, "send_failures"), 0);
+    });
+}
+
+/// A counter of a service's last statistics; the first come after a second.
+fn counter(world: &World, name: &str) -> u64 {
+    let path = world.dir.0.join("run/stats.json");
+    world.until("statistics", || path.exists());
+    let stats = std::fs::read(path).expect("statistics");
+    let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
+    stats.counters.iter().find(|counter| counter.name == name).expect("counter").value
+}
+
+/// Sets how many descriptors a child may have from now on; returns how many it could have before.
+fn limit_descriptors(child: &Process, most: Option<u64>) -> Option<u64> {
+    use rustix::process::{Pid, Resource, Rlimit, getrlimit, prlimit};
+    let limit = Rlimit { current: most, maximum: getrlimit(Resource::Nofile).maximum };
+    prlimit(Some(Pid::from_child(&child.0)), Resource::Nofile, limit).expect("one's own child").current
+}
+
+/// A service without a free descriptor cannot connect a client that comes.
+#[test]
+fn a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("left");
+        let config = world.config(CONFIG);
+        let service = world.start(&config, &[]);
+        let first = world.poses();
+        let _publisher = world.role("a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing", "publisher");
+        let mut last = None;
+        let served = |last: &mut Option<CorrectedPose>| {
+            let mut poses = 0;
+            world.until("100 poses", || {
+                poses += judged(&first, last);
+                poses > 100
+            });
+        };
+        served(&mut last);
+
+        let limit = limit_descriptors(&service, Some(1));
+        let second = world.poses();
+        served(&mut last);
+        limit_descriptors(&service, limit);
+        world.until("a count", || counter(&world, "readers_left_out") > 0);
+        world.until("a line", || world.log().contains("connecting a reader"));
+        assert!(second.latest().expect("nothing").is_none(), "left out");
+        assert_eq!(counter(&world, "send_failures"), 0);
+
+        // The next one that comes makes the service try again.
+        let third = world.poses();
+        for reader in [&second, &third] {
+            world.until("a pose", || reader.latest().expect("pose").is_some());
+        }
+        served(&mut last);
     });
 }
 

@@ -108,6 +108,7 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
         (counter("lost") > 0, "states were lost"),
         (counter("out_of_order") > 0, "states came out of order"),
         (counter("send_failures") > 0, "poses could not be sent"),
+        (counter("readers_left_out") > 0, "a client could not be connected"),
         (poses + missed + skipped + SLACK < sent, "states were not answered"),
         (refused + missed + skipped + delayed < faulty, "faults were not answered as such"),
         (valid * 2 < poses, "less than half of the poses were valid"),

@@ -7,6 +7,7 @@ use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
+use iceoryx2::port::{DegradationAction, DegradationCause};
 use iceoryx2::prelude::{BackpressureStrategy, ServiceName, SignalHandlingMode, ZeroCopySend, ipc};
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use iceoryx2::service::builder::publish_subscribe::{
@@ -18,6 +19,8 @@ use ravenpose_wire::{CorrectedPose, ICEORYX2_VERSION, POSE_SERVICE, RavenState, 
 use std::cell::Cell;
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 /// A message with its service.
@@ -161,6 +164,8 @@ pub struct Writer<T: Message> {
     /// Taken while there was nothing else to do; dropped before the port.
     next: Cell<Option<Loan<T>>>,
     publisher: Publisher<ipc::Service, T, ()>,
+    /// Readers that could not be connected, since last asked.
+    left_out: Arc<AtomicU64>,
     opened: Opened<T>,
 }
 
@@ -172,9 +177,18 @@ impl<T: Message> Writer<T> {
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
         let opened = open::<T>(settings)?;
         room::require(ROOM_OF_SERVICE + room_of_messages::<T>() + T::MAX_READERS as u64 * ROOM_OF_QUEUE)?;
+        let left_out = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&left_out);
         let publisher = opened
             .service
             .publisher_builder()
+            // The others go on being served; iceoryx2 by itself would say it only in a log that is off here.
+            .set_degradation_handler(move |cause, _| {
+                if matches!(cause, DegradationCause::FailedToEstablishConnection) {
+                    count.fetch_add(1, Relaxed);
+                }
+                DegradationAction::Ignore
+            })
             .max_loaned_samples(LOANED_MAX)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
@@ -192,7 +206,7 @@ impl<T: Message> Writer<T> {
         // Queues to readers that came at the same moment; what fails here fails again, and is said, when sending.
         let _ = publisher.update_connections();
         room::take(settings)?;
-        Ok(Self { next: Cell::new(None), publisher, opened })
+        Ok(Self { next: Cell::new(None), publisher, left_out, opened })
     }
 
     /// Does of the next message what can be done before it is there: takes its place and brings that memory to this core. Readers had it
@@ -209,7 +223,7 @@ impl<T: Message> Writer<T> {
     /// places of all readers that may come, twice; so does taking a message. Readers that came meanwhile are connected here and now, most
     /// of them not while a message waits.
     pub fn keep_warm(&self) {
-        // As when sending: a reader that cannot be connected is left out until readers come or go again, and iceoryx2 tells nobody.
+        // As when sending: a reader that cannot be connected is left out until readers come or go again, and counted.
         let _ = self.publisher.update_connections();
         // Given back at once. That there is none is said when sending.
         drop(self.free());
@@ -238,7 +252,14 @@ impl<T: Message> Writer<T> {
         self.loan()?.send(message)
     }
 
-    /// Readers connected now.
+    /// How often a reader could not be connected since this was last asked: no descriptor free, shared memory full. It gets nothing until
+    /// readers come or go again, when it is tried once more.
+    pub fn take_left_out(&self) -> u64 {
+        // Nearly always zero, and then only read.
+        if self.left_out.load(Relaxed) == 0 { 0 } else { self.left_out.swap(0, Relaxed) }
+    }
+
+    /// Readers that want this message now, left out or not.
     pub fn readers(&self) -> usize {
         self.opened.service.dynamic_config().number_of_subscribers()
     }
