@@ -450,7 +450,7 @@ fn a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing() {
     let _machine = machine();
     despite_stops(|| {
         let world = World::new("left");
-        let config = world.config(CONFIG);
+        let config = world.config("allow_untrained = true\nallow_degraded = true");
         let service = world.start(&config, &[]);
         let first = world.poses();
         let _publisher = world.role("a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing", "publisher");

@@ -144,7 +144,7 @@ fn become_the_robot() {
 }
 
 fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
-    let (runs, seconds) = (if full { 10_000 } else { 4_000 }, 40);
+    let (runs, seconds) = if full { (10_000, 40) } else { (3_000, 20) };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let service_core = cores - 1;
     // Before this thread is pinned: it then knows of one core.

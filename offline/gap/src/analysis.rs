@@ -17,8 +17,8 @@ use crate::problem::{Pair, Problem};
 use crate::robot::Robot;
 use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
-use crate::seldom::Seldom;
-use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, seldom, verdicts};
+use crate::unexplained::Unexplained;
+use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, unexplained, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -152,7 +152,7 @@ pub struct Found<'a> {
     /// What explained most, and not what was held out.
     pub refused: Option<&'a Refused>,
     /// Something far above the noise where nothing was found.
-    pub seldom: Option<Seldom>,
+    pub unexplained: Option<Unexplained>,
 }
 
 impl Found<'_> {
@@ -417,8 +417,8 @@ fn analyse_with(
         unmodelled,
         refused: refused.as_ref(),
         // Only against a lab's own simulation, whose floors are known.
-        seldom: (answer.effects.is_empty() && refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
-            .then(|| seldom::left(&problem, &floors))
+        unexplained: (answer.effects.is_empty() && refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
+            .then(|| unexplained::left(&problem, &floors))
             .flatten(),
     };
     progress("judging on what was held out");

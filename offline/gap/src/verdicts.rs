@@ -21,7 +21,7 @@ use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
 use crate::search::{Effect, Scored, complexity, is_uneven, likelihood};
-use crate::seldom::Seldom;
+use crate::unexplained::{Pattern, Unexplained};
 use crate::{experiment, regime, region};
 
 /// The schema's name of a channel.
@@ -122,7 +122,7 @@ pub(crate) fn outcome(
         }
     }
     let unnamed = found.controller.is_some()
-        || found.seldom.is_some()
+        || found.unexplained.is_some()
         || found.refused.is_some()
         || effects.iter().any(|effect| !effect.is_named());
     if let (Some(refused), None) = (found.refused, found.controller) {
@@ -131,8 +131,8 @@ pub(crate) fn outcome(
     if let Some(changed) = found.controller {
         verdicts.push(another_controller(found, effects.len() as u64 + 1, changed));
     }
-    if let (Some(seldom), None) = (&found.seldom, found.controller) {
-        verdicts.push(seen_seldom(found, seldom));
+    if let (Some(unexplained), None) = (&found.unexplained, found.controller) {
+        verdicts.push(seen(found, unexplained));
     }
     if found.unmodelled && !unnamed {
         verdicts.push(unmodelled(found, effects.len() as u64 + 1));
@@ -521,14 +521,24 @@ fn another_controller(found: &Found, number: u64, changed: Changed) -> Verdict {
     Verdict::unmodelled(number, 0.9, Location::new(Told::Command, joint, Subsystem::Controller, regime), evidence)
 }
 
-/// The verdict of what is there, but too seldom to be explained.
-fn seen_seldom(found: &Found, seldom: &Seldom) -> Verdict {
-    let cell = &found.problem.cells[seldom.cell];
-    let (floor, unit) = (found.floors[seldom.cell], cell_unit(found.robot, cell));
-    let regime = Regime::new(Feature::Time, "in few places".to_owned());
+/// The verdict of what is there where nothing explains it.
+fn seen(found: &Found, unexplained: &Unexplained) -> Verdict {
+    let cell = &found.problem.cells[unexplained.cell];
+    let unit = cell_unit(found.robot, cell);
+    let (places, pattern) = match unexplained.pattern {
+        Pattern::Seldom => {
+            let share = 100.0 * unexplained.share;
+            ("in few places".to_owned(), format!("{share:.0} % of it in few places: too seldom to be held against other data"))
+        }
+        Pattern::Again { frequency_hz } => (
+            format!("comes again, mostly at {frequency_hz:.2} Hz"),
+            format!("foreseen by its own past, as noise is not: it comes again, mostly at {frequency_hz:.2} Hz"),
+        ),
+    };
+    let regime = Regime::new(Feature::Time, places);
     let mut location = Location::new(told(cell.channel), vec![cell_name(found.robot, cell)], Subsystem::Unknown, regime);
-    location.energy_share = Some(seldom.share.clamp(0.0, 1.0));
-    location.time_intervals = seldom
+    location.energy_share = Some(unexplained.share.clamp(0.0, 1.0));
+    location.time_intervals = unexplained
         .stretches
         .iter()
         .map(|&(run, [from, to])| {
@@ -536,12 +546,9 @@ fn seen_seldom(found: &Found, seldom: &Seldom) -> Verdict {
             Interval::new(&run.id, (run.start_s + from).max(0.0), (run.start_s + to).max(0.0))
         })
         .collect();
-    let claim = format!(
-        "{:.3e} {unit} RMS where noise alone gives {floor:.1e}, {:.0} % of it in few places: too seldom to be held against other data",
-        seldom.rms,
-        100.0 * seldom.share
-    );
-    Verdict::unmodelled(1, 0.9, location, Evidence::new("size over the noise floor", claim, (seldom.rms, unit), TestMethod::Gate))
+    let (rms, floor) = (unexplained.rms, unexplained.floor);
+    let claim = format!("{rms:.3e} {unit} RMS where noise alone gives {floor:.1e}, {pattern}");
+    Verdict::unmodelled(1, 0.9, location, Evidence::new("size over the noise floor", claim, (rms, unit), TestMethod::Gate))
 }
 
 /// The verdict of an effect whose explanation does not hold on what was held out.
@@ -575,15 +582,19 @@ fn unnamed(found: &Found, k: usize, effect: &Effect, estimate: &Estimate) -> Ver
 
 fn remaining(found: &Found) -> Remaining {
     let ceiling = found.ceiling;
-    let unnamed: Vec<&str> = found
+    let unnamed: Vec<String> = found
         .answer
         .effects
         .iter()
         .filter(|e| !e.is_named())
         .map(|e| e.chosen.candidate.family.form)
         .chain(found.controller.map(|_| "tracking error"))
-        .chain(found.seldom.as_ref().map(|_| "time"))
         .chain(found.refused.filter(|_| found.controller.is_none()).map(Refused::goes_with))
+        .map(str::to_owned)
+        .chain(found.unexplained.as_ref().map(|unexplained| match unexplained.pattern {
+            Pattern::Seldom => "time".to_owned(),
+            Pattern::Again { frequency_hz } => format!("time, mostly at {frequency_hz:.2} Hz"),
+        }))
         .collect();
     // Of what was gained, the part that has names.
     let gained = |named: bool| found.answer.effects.iter().filter(|e| !named || e.is_named()).map(|e| e.gain.nats).sum::<f64>();
@@ -592,10 +603,11 @@ fn remaining(found: &Found) -> Remaining {
     Remaining {
         library_gain_nats: ceiling.library_nats,
         flexible_gain_nats: ceiling.together_nats,
-        explained_share: Some((share * named).clamp(0.0, 1.0)),
+        // Neither the library nor the ceiling sees what nothing explains.
+        explained_share: found.unexplained.is_none().then(|| (share * named).clamp(0.0, 1.0)),
         depends_on: (found.unmodelled || !unnamed.is_empty()).then(|| {
-            let all = unnamed.into_iter().chain(ceiling.depends_on.iter().copied().filter(|_| found.unmodelled));
-            all.map(str::to_owned).collect()
+            let of_ceiling = ceiling.depends_on.iter().copied().filter(|_| found.unmodelled).map(str::to_owned);
+            unnamed.into_iter().chain(of_ceiling).collect()
         }),
         fit: None,
         extra: gap_report::Extra::default(),

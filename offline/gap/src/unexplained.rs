@@ -1,0 +1,129 @@
+//! What is far above the noise where nothing was found: in so few places that no hypothesis can be held against what was left out (a wall that
+//! is touched once, a cable that slipped for a moment), or so fast that differences of the rows take it for noise (a motor that shakes the
+//! arm). It has no name, but it is no agreement either.
+
+use crate::noise::Noise;
+use crate::nominal::rms;
+use crate::problem::{Cell, Channel, Problem};
+
+/// Times the noise floor that is left where nothing was found. Robots without an effect stay below 1 (docs/proof.md).
+const BEYOND: f64 = 3.0;
+/// Times what it would be if it were noise behind the window. Robots without an effect stay near 1.
+const FORESEEN: f64 = 2.5;
+/// Squared error of a block, of the largest block's, from which it belongs to the place.
+const BELONGS: f64 = 0.25;
+
+/// Why it is no noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pattern {
+    /// It stands high in few places.
+    Seldom,
+    /// Its own past tells it.
+    Again {
+        /// Where it is strongest, Hz.
+        frequency_hz: f64,
+    },
+}
+
+/// Where and how it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// Cell of the problem.
+    pub cell: usize,
+    /// RMS over all rows, in the cell's unit.
+    pub rms: f64,
+    /// What noise alone gives, in the same unit.
+    pub floor: f64,
+    /// Why it is no noise.
+    pub pattern: Pattern,
+    /// Share of the cell's squared error in the stretches.
+    pub share: f64,
+    /// Run, and s from its start: the stretches in which it is.
+    pub stretches: Vec<(usize, [f64; 2])>,
+}
+
+/// The residual of each run.
+fn by_run(problem: &Problem, cell: &Cell) -> Vec<Vec<f64>> {
+    let of = |run: usize| cell.rows.iter().zip(&cell.residual).filter(move |(row, _)| row.0 == run).map(|(_, y)| *y);
+    (0..problem.pairs.len()).map(|run| of(run).collect()).filter(|rows: &Vec<f64>| !rows.is_empty()).collect()
+}
+
+/// Samples from row to row.
+fn step(problem: &Problem) -> usize {
+    let rows = &problem.pairs[0].real.rows;
+    rows.get(1).map_or(1, |second| second - rows[0])
+}
+
+/// RMS of a cell over what it would be if white noise behind the window had the innovations that it has: 1 for noise, large for what comes
+/// again, however fast.
+fn foreseen(problem: &Problem, cell: &Cell) -> f64 {
+    let runs = by_run(problem, cell);
+    let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
+    let mut innovations = Vec::new();
+    let noise = Noise::fit(&runs);
+    runs.iter().for_each(|run| noise.whiten(run, &mut innovations));
+    // The window itself makes noise foreseeable.
+    let behind = problem.pairs[0].real.window.autocovariance(step(problem), 3);
+    let window = Noise::from_autocovariance(&behind, cell.rows.len());
+    let told: f64 = window.coefficients.iter().zip(&behind[1..]).map(|(phi, covariance)| phi * covariance).sum();
+    let own = (1.0 - told / behind[0]).max(0.0).sqrt();
+    rms(cell.residual.iter().copied()) * own / rms(innovations.into_iter()).max(1e-300)
+}
+
+/// The frequency at which a cell is strongest, Hz, of as many as its longest run tells apart.
+fn strongest(problem: &Problem, cell: &Cell) -> f64 {
+    let runs = by_run(problem, cell);
+    let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
+    let period_s = step(problem) as f64 * problem.pairs[0].real.run.dt_s;
+    let power = |run: &[f64], turns: f64| {
+        let at = |k: usize| std::f64::consts::TAU * turns * k as f64;
+        let (cos, sin) = run.iter().enumerate().fold((0.0, 0.0), |(c, s), (k, y)| (c + y * at(k).cos(), s + y * at(k).sin()));
+        cos * cos + sin * sin
+    };
+    let turns = |k: usize| k as f64 / longest as f64;
+    let of = |k: usize| runs.iter().map(|run| power(run, turns(k))).sum::<f64>();
+    let all: Vec<f64> = (1..=longest / 2).map(of).collect();
+    let best = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).map_or(0.0, |k| turns(k + 1));
+    best / period_s
+}
+
+/// What nothing explains, in the cell where it stands highest above its floor; none where all stay near theirs.
+pub(crate) fn left(problem: &Problem, floors: &[f64]) -> Option<Unexplained> {
+    let size = |c: usize| rms(problem.cells[c].residual.iter().copied());
+    let above = |c: usize| size(c) / floors[c].max(1e-300);
+    let highest = |of: &dyn Fn(usize) -> f64, from: f64| {
+        let heights = (0..problem.cells.len()).filter(|c| problem.cells[*c].channel != Channel::EndEffector).map(|c| (c, of(c)));
+        heights.filter(|(_, height)| *height > from).max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    // What a corrected model is known to get wrong may be told by its past; points have no past.
+    let again = || {
+        let asked = !problem.practical.is_known() && !problem.of_points();
+        asked.then(|| highest(&|c| foreseen(problem, &problem.cells[c]), FORESEEN)).flatten()
+    };
+    let ((cell, height), pattern) = match highest(&above, BEYOND) {
+        Some(found) => (found, Pattern::Seldom),
+        None => again().map(|found| (found, Pattern::Again { frequency_hz: strongest(problem, &problem.cells[found.0]) }))?,
+    };
+    let floor = size(cell) / height;
+    let of = &problem.cells[cell];
+    let mut blocks = vec![(0.0, None::<(usize, [f64; 2])>); problem.block_count];
+    for ((&(run, i), y), &block) in of.rows.iter().zip(&of.residual).zip(&problem.blocks[cell]) {
+        let t = i as f64 * problem.pairs[run].real.run.dt_s;
+        let (sum, place) = &mut blocks[block];
+        *sum += y * y;
+        place.get_or_insert((run, [t, t])).1[1] = t;
+    }
+    let total: f64 = blocks.iter().map(|(sum, _)| sum).sum();
+    let most = blocks.iter().map(|(sum, _)| *sum).fold(0.0, f64::max);
+    let (mut stretches, mut inside): (Vec<(usize, [f64; 2])>, f64) = (Vec::new(), 0.0);
+    for (sum, place) in blocks.iter().filter(|(sum, _)| *sum >= BELONGS * most) {
+        inside += sum;
+        let Some((run, [from, to])) = *place else { continue };
+        match stretches.last_mut() {
+            // The next block begins a row after the last one ended.
+            Some((last, [_, end])) if *last == run && from - *end < 0.1 => *end = to,
+            _ => stretches.push((run, [from, to])),
+        }
+    }
+    Some(Unexplained { cell, rms: size(cell), floor, pattern, share: inside / total.max(1e-300), stretches })
+}
