@@ -94,7 +94,7 @@ chain: offline
 emulated:
 	tests/emulated/run.sh $(BUILD)/emulated $(EMULATED)
 
-# Five minutes: the network beside tract, and input to output through shared memory, in one run.
+# Two minutes: the network beside tract, and input to output through shared memory, in one run.
 bench-ci: build
 	target/release/ravenpose-bench ci
 

@@ -10,7 +10,7 @@ const PAGE: &str = "# Performance
 
 Written by `make bench`: every table by one run of `ravenpose-bench full --write`, the offline tools by `bench/offline.py`
 just before it, Keras by `bench/keras_predict.py` when its lines say. Such machines are shared and noisy:
-compare by ratio, within one table. `make bench-ci` is the five-minute part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `memory`,
+compare by ratio, within one table. `make bench-ci` is the short part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `memory`,
 `sleep`, `spin`, `event`, `means`) one part of that. Simulator, recordings, vision and gap finder: `make bench-offline`; training:
 [training.md](training.md).
 

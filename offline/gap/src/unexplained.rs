@@ -61,7 +61,9 @@ fn foreseen(problem: &Problem, cell: &Cell) -> f64 {
     let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     let mut innovations = Vec::new();
     let noise = Noise::fit(&runs);
-    runs.iter().for_each(|run| noise.whiten(run, &mut innovations));
+    for run in &runs {
+        noise.whiten(run, &mut innovations);
+    }
     // The window itself makes noise foreseeable.
     let behind = problem.pairs[0].real.window.autocovariance(step(problem), 3);
     let window = Noise::from_autocovariance(&behind, cell.rows.len());
