@@ -66,6 +66,11 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// What a counter stood at; none of that name.
+    pub fn counter(&self, name: &str) -> Option<u64> {
+        self.counters.iter().find(|counter| counter.name == name).map(|counter| counter.value)
+    }
+
     /// Collects what the loop has shown.
     pub fn collect(shared: &Shared, total: &Histograms, uptime: Duration, models: &[String; ARMS]) -> Self {
         let arms = (0..ARMS)

@@ -431,7 +431,7 @@ fn counter(world: &World, name: &str) -> u64 {
     world.until("statistics", || path.exists());
     let stats = std::fs::read(path).expect("statistics");
     let stats: ravenpose::report::Stats = serde_json::from_slice(&stats).expect("statistics");
-    stats.counters.iter().find(|counter| counter.name == name).expect("counter").value
+    stats.counter(name).expect("counter")
 }
 
 /// Sets how many descriptors a child may have from now on; returns how many it could have before.

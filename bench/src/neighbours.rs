@@ -125,7 +125,7 @@ fn ask(conditions: &[Condition], minutes: u64, become_the_robot: fn(), core: usi
     let seen = seen.as_mut().map_err(|error| error.clone())?;
     let counts = disturbed?;
     let stats = world.stop().ok_or_else(|| format!("the service ended by itself: {}", world.last_words()))?;
-    let failures = stats.counters.iter().find(|counter| counter.name == "send_failures").map_or(0, |counter| counter.value);
+    let failures = stats.counter("send_failures").expect("a counter of the service");
     if failures > 0 {
         return Err(format!("{failures} poses could not be sent"));
     }

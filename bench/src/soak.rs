@@ -88,7 +88,7 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
     let ended = world.ended();
     let stats =
         world.stop().filter(|_| !ended).ok_or_else(|| format!("{name}: the service ended by itself: {}", world.last_words()))?;
-    let counter = |name: &str| stats.counters.iter().find(|counter| counter.name == name).map_or(0, |counter| counter.value);
+    let counter = |name: &str| stats.counter(name).expect("a counter of the service");
     let us = |quantiles: [u64; 4]| quantiles.map(|ns| ns as f64 / 1000.0);
     table.row(&format!("{name}: state made -> pose sealed, {} poses", seen.poses), &quantiles(&mut seen.age));
     for stage in

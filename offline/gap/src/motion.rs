@@ -146,6 +146,16 @@ impl Motion {
         State { position, velocity: at(&self.velocity), acceleration: at(&self.acceleration) }
     }
 
+    /// Samples from row to row.
+    pub fn step(&self) -> usize {
+        self.rows.get(1).map_or(1, |second| second - self.rows[0])
+    }
+
+    /// Autocovariance that white noise of variance 1 at the sensor has behind the window, from row to row, at lags 0 to 3.
+    pub fn noise_of_rows(&self) -> Vec<f64> {
+        self.window.autocovariance(self.step(), 3)
+    }
+
     /// Speed below which the sign of the velocity is not known, rad/s or m/s: three standard deviations of the quick
     /// velocity's noise, estimated from its third differences.
     pub fn sign_speed(&self, joint: usize) -> f64 {

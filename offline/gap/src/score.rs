@@ -375,7 +375,7 @@ fn squared_error(sums: &DMatrix<f64>, theta: &DVector<f64>, p: usize) -> f64 {
 }
 
 /// Innovations of a cell's series, run by run.
-fn whiten(problem: &Problem, noise: &Noise, cell: usize, series: &[f64]) -> Vec<f64> {
+pub(crate) fn whiten(problem: &Problem, noise: &Noise, cell: usize, series: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(series.len());
     for segment in segments(problem, cell) {
         noise.whiten(&series[segment], &mut out);

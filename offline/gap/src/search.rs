@@ -186,9 +186,7 @@ fn shares(before: &Fit, after: &Fit) -> Vec<f64> {
 
 /// Measurement noise of every cell: white at the sensor, coloured by the window.
 fn window_noise(problem: &Problem) -> Vec<Noise> {
-    let motion = &problem.pairs[0].real;
-    let step = motion.rows.get(1).map_or(1, |second| second - motion.rows[0]);
-    let behind = motion.window.autocovariance(step, 3);
+    let behind = problem.pairs[0].real.noise_of_rows();
     let white = problem.from_recording;
     let of = |tip: bool, rows: usize| if tip || white { Noise::default() } else { Noise::from_autocovariance(&behind, rows) };
     problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()

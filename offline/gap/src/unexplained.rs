@@ -4,9 +4,10 @@
 
 use crate::noise::Noise;
 use crate::nominal::rms;
-use crate::problem::{Cell, Channel, Problem};
+use crate::problem::{Channel, Problem};
+use crate::score::{segments, whiten};
 
-/// Times the noise floor that is left where nothing was found. Robots without an effect stay below 1 (docs/proof.md).
+/// Times the noise floor that is left where nothing was found. Robots without an effect stay near 1.
 const BEYOND: f64 = 3.0;
 /// Times what it would be if it were noise behind the window. Robots without an effect stay near 1.
 const FORESEEN: f64 = 2.5;
@@ -42,41 +43,30 @@ pub struct Unexplained {
     pub stretches: Vec<(usize, [f64; 2])>,
 }
 
-/// The residual of each run.
-fn by_run(problem: &Problem, cell: &Cell) -> Vec<Vec<f64>> {
-    let of = |run: usize| cell.rows.iter().zip(&cell.residual).filter(move |(row, _)| row.0 == run).map(|(_, y)| *y);
-    (0..problem.pairs.len()).map(|run| of(run).collect()).filter(|rows: &Vec<f64>| !rows.is_empty()).collect()
-}
-
-/// Samples from row to row.
-fn step(problem: &Problem) -> usize {
-    let rows = &problem.pairs[0].real.rows;
-    rows.get(1).map_or(1, |second| second - rows[0])
-}
-
 /// RMS of a cell over what it would be if white noise behind the window had the innovations that it has: 1 for noise, large for what comes
 /// again, however fast.
-fn foreseen(problem: &Problem, cell: &Cell) -> f64 {
-    let runs = by_run(problem, cell);
-    let runs: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-    let mut innovations = Vec::new();
-    let noise = Noise::fit(&runs);
-    for run in &runs {
-        noise.whiten(run, &mut innovations);
-    }
+fn foreseen(problem: &Problem, c: usize) -> f64 {
+    let cell = &problem.cells[c];
+    let innovations = whiten(problem, &Noise::fit(&by_run(problem, c)), c, &cell.residual);
     // The window itself makes noise foreseeable.
-    let behind = problem.pairs[0].real.window.autocovariance(step(problem), 3);
+    let behind = problem.pairs[0].real.noise_of_rows();
     let window = Noise::from_autocovariance(&behind, cell.rows.len());
     let told: f64 = window.coefficients.iter().zip(&behind[1..]).map(|(phi, covariance)| phi * covariance).sum();
     let own = (1.0 - told / behind[0]).max(0.0).sqrt();
     rms(cell.residual.iter().copied()) * own / rms(innovations.into_iter()).max(1e-300)
 }
 
+/// The residual of a cell, run by run.
+fn by_run<'p>(problem: &'p Problem, c: usize) -> Vec<&'p [f64]> {
+    segments(problem, c).into_iter().map(|rows| &problem.cells[c].residual[rows]).collect()
+}
+
 /// The frequency at which a cell is strongest, Hz, of as many as its longest run tells apart.
-fn strongest(problem: &Problem, cell: &Cell) -> f64 {
-    let runs = by_run(problem, cell);
-    let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
-    let period_s = step(problem) as f64 * problem.pairs[0].real.run.dt_s;
+fn strongest(problem: &Problem, c: usize) -> f64 {
+    let runs = by_run(problem, c);
+    let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
+    let motion = &problem.pairs[0].real;
+    let period_s = motion.step() as f64 * motion.run.dt_s;
     let power = |run: &[f64], turns: f64| {
         let at = |k: usize| std::f64::consts::TAU * turns * k as f64;
         let (cos, sin) = run.iter().enumerate().fold((0.0, 0.0), |(c, s), (k, y)| (c + y * at(k).cos(), s + y * at(k).sin()));
@@ -100,11 +90,11 @@ pub(crate) fn left(problem: &Problem, floors: &[f64]) -> Option<Unexplained> {
     // What a corrected model is known to get wrong may be told by its past; points have no past.
     let again = || {
         let asked = !problem.practical.is_known() && !problem.of_points();
-        asked.then(|| highest(&|c| foreseen(problem, &problem.cells[c]), FORESEEN)).flatten()
+        asked.then(|| highest(&|c| foreseen(problem, c), FORESEEN)).flatten()
     };
     let ((cell, height), pattern) = match highest(&above, BEYOND) {
         Some(found) => (found, Pattern::Seldom),
-        None => again().map(|found| (found, Pattern::Again { frequency_hz: strongest(problem, &problem.cells[found.0]) }))?,
+        None => again().map(|found| (found, Pattern::Again { frequency_hz: strongest(problem, found.0) }))?,
     };
     let floor = size(cell) / height;
     let of = &problem.cells[cell];

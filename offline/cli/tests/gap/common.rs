@@ -63,6 +63,26 @@ pub(crate) fn lines(path: &Path) -> Vec<String> {
     table.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
 }
 
+/// A table with its values changed, by column and row, or a column left out where nothing comes back.
+pub(crate) fn with_columns(folder: &Folder, name: &str, path: &Path, change: impl Fn(&str, usize, f64) -> Option<f64>) -> PathBuf {
+    let all = lines(path);
+    let header: Vec<&str> = all[0].split(',').collect();
+    let kept: Vec<usize> = (0..header.len()).filter(|k| change(header[*k], 0, 1.0).is_some()).collect();
+    let row = |(place, line): (usize, &String)| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let cell = |k: &usize| {
+            // The tip is not in every row.
+            cells[*k]
+                .parse()
+                .map_or_else(|_| cells[*k].to_owned(), |value| change(header[*k], place, value).expect("kept").to_string())
+        };
+        kept.iter().map(cell).collect::<Vec<_>>().join(",")
+    };
+    let head = kept.iter().map(|k| header[*k]).collect::<Vec<_>>().join(",");
+    let rows: Vec<String> = std::iter::once(head).chain(all[1..].iter().enumerate().map(row)).collect();
+    folder.write(name, rows.join("\n") + "\n")
+}
+
 /// The report of a folder, after every promise about its files was looked at.
 pub(crate) fn report(out: &Path, output: &Output) -> Report {
     let json = std::fs::read_to_string(out.join("report.json")).unwrap_or_else(|error| panic!("{error}: {}", errors(output)));

@@ -1,7 +1,7 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
 use crate::common::{
-    Case, Folder, done, holds, lines, made, named, near, parameter, primary, report, text, wanted, with_effect, written,
+    Case, Folder, done, holds, made, named, near, parameter, primary, report, text, wanted, with_columns, with_effect, written,
 };
 use gap_report::{Channel, RegionKind, Report, Status};
 use generator::order::{Kind, Order, Wanted};
@@ -161,27 +161,18 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
     assert!(report.mismatch.detected && !primary(&report).is_empty());
 }
 
-/// A table with something added to one of its columns, by the row.
-fn shaken(folder: &Folder, path: &Path, column: &str, by: impl Fn(usize) -> f64) -> PathBuf {
-    let all = lines(path);
-    let place = all[0].split(',').position(|name| name == column).expect("the column");
-    let row = |(k, line): (usize, &String)| {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        cells[place] = (cells[place].parse::<f64>().expect("a number") + by(k)).to_string();
-        cells.join(",")
-    };
-    let rows: Vec<String> = std::iter::once(all[0].clone()).chain(all[1..].iter().enumerate().map(row)).collect();
-    folder.write(&format!("shaken-{}.csv", path.file_name().expect("a name").display()), rows.join("\n") + "\n")
-}
-
 #[test]
 fn what_shakes_an_arm_faster_than_it_moves_is_no_agreement() {
     // Within three rows, 60 ms, half of it turns round: it was taken for noise, and everything for agreement, with a probability of 1.
     const HZ: f64 = 2.7;
     let folder = Folder::new("shaken");
     let (mut case, _) = made(&folder, "null", &[], 12.0);
-    for path in &mut case.real {
-        *path = shaken(&folder, path, "tau_1_nm", |k| 0.008 * (std::f64::consts::TAU * HZ * 1e-3 * k as f64).sin());
+    let shaking = |column: &str, row: usize, value: f64| {
+        let by = if column == "tau_1_nm" { 0.008 * (std::f64::consts::TAU * HZ * 1e-3 * row as f64).sin() } else { 0.0 };
+        Some(value + by)
+    };
+    for (k, path) in case.real.iter_mut().enumerate() {
+        *path = with_columns(&folder, &format!("shaken-{k}.csv"), path, shaking);
     }
     let out = folder.file("out");
     let report = case.judged(&out);

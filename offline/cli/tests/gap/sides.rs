@@ -1,6 +1,6 @@
 //! What is not the same on both sides: columns, units, signs, the robot.
 
-use crate::common::{Case, Folder, lines, made, near, primary, refused, report, wanted};
+use crate::common::{Case, Folder, lines, made, near, primary, refused, report, wanted, with_columns};
 use gap_report::{Channel, Level, Report, Status};
 use std::path::{Path, PathBuf};
 
@@ -11,26 +11,8 @@ fn friction(folder: &Folder) -> Case {
     made(folder, "sides", &[wanted("coulomb_friction", Some(2), &[("f_c", FRICTION)])], 12.0).0
 }
 
-/// A table with one column after the other changed, or left out where nothing comes back.
-fn with_columns(folder: &Folder, name: &str, path: &Path, change: impl Fn(&str, f64) -> Option<f64>) -> PathBuf {
-    let all = lines(path);
-    let header: Vec<&str> = all[0].split(',').collect();
-    let kept: Vec<usize> = (0..header.len()).filter(|k| change(header[*k], 1.0).is_some()).collect();
-    let row = |line: &String| {
-        let cells: Vec<&str> = line.split(',').collect();
-        let cell = |k: &usize| {
-            // The tip is not in every row.
-            cells[*k].parse().map_or_else(|_| cells[*k].to_owned(), |value| change(header[*k], value).expect("kept").to_string())
-        };
-        kept.iter().map(cell).collect::<Vec<_>>().join(",")
-    };
-    let head = kept.iter().map(|k| header[*k]).collect::<Vec<_>>().join(",");
-    let rows: Vec<String> = std::iter::once(head).chain(all[1..].iter().map(row)).collect();
-    folder.write(name, rows.join("\n") + "\n")
-}
-
-fn without(start: &str) -> impl Fn(&str, f64) -> Option<f64> + '_ {
-    move |column, value| (!column.starts_with(start)).then_some(value)
+fn without(start: &str) -> impl Fn(&str, usize, f64) -> Option<f64> + '_ {
+    move |column, _, value| (!column.starts_with(start)).then_some(value)
 }
 
 fn told<'r>(report: &'r Report, check: &str) -> &'r str {
@@ -87,7 +69,7 @@ fn a_torque_that_stands_at_a_limit_is_left_out_there_and_told() {
         sizes.sort_by(f64::total_cmp);
         sizes[sizes.len() * 9 / 10]
     };
-    let cut = |column: &str, value: f64| Some(if column == "tau_2_nm" { value.clamp(-limit, limit) } else { value });
+    let cut = |column: &str, _: usize, value: f64| Some(if column == "tau_2_nm" { value.clamp(-limit, limit) } else { value });
     let real = case.real.iter().enumerate().map(|(k, path)| with_columns(&folder, &format!("cut-{k}.csv"), path, cut)).collect();
     let report = Case { real, sim: case.sim.clone(), robot: case.robot.clone() }.judged(&folder.file("out"));
     let said = told(&report, "saturation");
@@ -102,7 +84,7 @@ fn without_a_common_channel_there_is_one_line() {
     let folder = Folder::new("sides-none");
     let case = friction(&folder);
     let only = |folder: &Folder, name: &str, path: &Path, quantity: &'static str| {
-        with_columns(folder, name, path, move |column, value| {
+        with_columns(folder, name, path, move |column, _, value| {
             let kept = ["t_s", "mpos_", quantity].iter().any(|start| column.starts_with(start));
             kept.then_some(value)
         })
@@ -117,7 +99,7 @@ fn without_a_common_channel_there_is_one_line() {
 /// Recordings in which numbers of the columns that begin so are so many times what they were.
 fn scaled(folder: &Folder, case: &Case, name: &str, start: &'static str, times: f64) -> Case {
     let other = |(k, path): (usize, &PathBuf)| {
-        with_columns(folder, &format!("{name}-{k}.csv"), path, move |column, value| {
+        with_columns(folder, &format!("{name}-{k}.csv"), path, move |column, _, value| {
             Some(if column.starts_with(start) { times * value } else { value })
         })
     };

@@ -63,7 +63,7 @@ fn late_torque(dictionary: &Dictionary, of: impl Fn(f64, f64) -> f64) -> Column 
             let sign = sign_series(&pair.real, j);
             let model: Vec<f64> =
                 problem.loads[r].iter().zip(&pair.real.rows).map(|(load, &i)| of(load.motor[j], coulomb * sign[i])).collect();
-            let step = pair.real.rows.get(1).map_or(1.0, |second| (second - pair.real.rows[0]) as f64) * pair.real.run.dt_s;
+            let step = pair.real.step() as f64 * pair.real.run.dt_s;
             for k in 0..model.len() {
                 let (low, high) = (k.saturating_sub(1), (k + 1).min(model.len() - 1));
                 slope.push(-(model[high] - model[low]) / ((high - low).max(1) as f64 * step));
