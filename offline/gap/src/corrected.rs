@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{Candidate, LATE_COUPLING, TOOL_LENGTH, TOOL_TWIST, direction};
+use crate::hypothesis::{AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, SENSOR, TOOL_LENGTH, TOOL_TWIST, direction};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -220,7 +220,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
     let numbers: Vec<(&str, f64)> = estimate.parameters.iter().map(|(named, _)| (named.name, named.value)).collect();
     let mut parameters = Parameters::of(&numbers);
     // Before the cable, where there is one.
-    let on_motor = family.form == "motor side" && joint.is_some_and(|j| found.nominal.compliance[j][0] > 0.0);
+    let on_motor = AT_MOTOR.contains(&family.form) && joint.is_some_and(|j| found.nominal.compliance[j][0] > 0.0);
     let at_joint = || joint.map(if on_motor { Bound::Motor } else { Bound::Joint }).ok_or_else(|| "it has no joint".to_owned());
     let mut name = family.physics;
     let bound = match (family.physics, family.form) {
@@ -273,12 +273,13 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
                 .to_owned());
         }
         ("thermal_drift", _) if !parameters.0.contains_key("kappa_T") => {
-            return Err(if family.form == "position" {
+            return Err(if DRIFTS.contains(&family.form) {
                 "a position that drifts is not a term of the simulator".to_owned()
             } else {
                 "the model has no friction there that could fade".to_owned()
             });
         }
+        ("joint_offset", SENSOR) => return Err("a sensor at a joint whose zero is off is not a term of the simulator".to_owned()),
         ("cable_hysteresis", "play of many widths") => {
             return Err("play of many widths, of a joint without known load, is not a term of the simulator".to_owned());
         }

@@ -277,16 +277,11 @@ impl Nominal {
             if x.len() < 40 || rms(y.iter().copied()) < 1e-12 {
                 continue;
             }
-            let slope = dot(x, y) / dot(x, x).max(1e-30);
-            let left = rms(x.iter().zip(y).map(|(x, y)| y - slope * x)) / rms(y.iter().copied());
-            // A transmission that does not follow its load is taken for rigid.
-            compliance[j] = [if left < 0.8 { slope.max(0.0) } else { 0.0 }, 0.0];
+            let cable = cable(x, &strain.rubbed, y);
+            compliance[j] = [cable.as_ref().map_or(0.0, |cable| cable.compliance), 0.0];
             self.late_s[j] = 0.0;
-            if left >= 0.8 {
-                continue;
-            }
-            if let Some((slope, friction)) = with_friction(x, &strain.rubbed, y) {
-                compliance[j][0] = slope;
+            let Some(cable) = cable else { continue };
+            if let Some(friction) = cable.friction {
                 (self.link_friction[j], self.link_sign_width[j]) = (friction, None);
             }
             if robot.simulates_itself
@@ -351,8 +346,11 @@ impl Strain {
     }
 }
 
-/// Share of the misfit of the load alone that friction behind the cable has to leave less than.
+/// Share of the misfit of the load alone that friction behind the cable has to leave less than, and of that of friction alone.
 const RUBS: f64 = 0.9;
+
+/// Share of a deflection that its load has to leave less than, with the friction beside it.
+const FOLLOWS: f64 = 0.8;
 
 /// Share of the misfit that friction and a late sensor together have to leave less than.
 const LATE: f64 = 0.7;
@@ -364,22 +362,33 @@ fn fitted(columns: &[&[f64]], seen: &[f64]) -> (f64, Vec<f64>) {
     (rms((0..seen.len()).map(|k| seen[k] - told(k))), at)
 }
 
-/// Compliance and friction (viscous, dry) from a deflection; none where friction explains little or would give energy.
-fn with_friction(load: &[f64], rubbed: &[Vec<f64>; 2], seen: &[f64]) -> Option<(f64, [f64; 2])> {
-    let (alone, _) = fitted(&[load], seen);
+/// What a deflection says of a cable.
+#[derive(Debug, PartialEq)]
+struct Cable {
+    compliance: f64,
+    /// Viscous and dry, behind it.
+    friction: Option<[f64; 2]>,
+}
+
+/// A cable from its deflection under a load, with the friction behind it (velocity and its sign) where that explains much beside the load and
+/// takes energy away; none where the deflection follows neither: such a transmission is taken for rigid.
+fn cable(load: &[f64], rubbed: &[Vec<f64>; 2], seen: &[f64]) -> Option<Cable> {
+    let (alone, slope) = fitted(&[load], seen);
+    let follows = |left: f64| left < FOLLOWS * rms(seen.iter().copied());
     let tries: [&[usize]; 3] = [&[0, 1], &[0], &[1]];
     for which in tries {
         let columns: Vec<&[f64]> = std::iter::once(load).chain(which.iter().map(|k| &rubbed[*k][..])).collect();
         let (left, at) = fitted(&columns, seen);
-        if at.iter().all(|x| *x > 0.0) && left < RUBS * alone {
+        let (unloaded, _) = fitted(&columns[1..], seen);
+        if at.iter().all(|x| *x > 0.0) && left < RUBS * alone.min(unloaded) && follows(left) {
             let mut friction = [0.0; 2];
             for (k, theta) in which.iter().zip(at.iter().skip(1)) {
                 friction[*k] = theta / at[0];
             }
-            return Some((at[0], friction));
+            return Some(Cable { compliance: at[0], friction: Some(friction) });
         }
     }
-    None
+    follows(alone).then(|| Cable { compliance: slope[0].max(0.0), friction: None })
 }
 
 /// One weighted row of a normal equation.
@@ -491,4 +500,40 @@ pub fn less_means(series: &[f64], run_of: impl Fn(usize) -> usize) -> Vec<f64> {
     let means: Vec<f64> =
         (0..runs).map(|r| mean(&(0..series.len()).filter(|k| run_of(*k) == r).map(|k| series[k]).collect::<Vec<_>>())).collect();
     series.iter().enumerate().map(|(k, y)| y - means[run_of(k)]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cable, cable};
+
+    /// A load, a joint's velocity and its sign, row by row.
+    fn motion() -> (Vec<f64>, [Vec<f64>; 2]) {
+        let load = (0..400).map(|k| (0.031 * f64::from(k)).sin() + 0.1).collect();
+        let velocity: Vec<f64> = (0..400).map(|k| (0.05 * f64::from(k)).cos()).collect();
+        let sign = velocity.iter().map(|v| v.signum()).collect();
+        (load, [velocity, sign])
+    }
+
+    #[test]
+    fn a_cable_is_known_by_its_load_though_friction_behind_it_is_larger() {
+        let (load, rubbed) = motion();
+        let seen: Vec<f64> = (0..load.len()).map(|k| 2e-5 * (load[k] + 0.3 * rubbed[0][k] + 0.9 * rubbed[1][k])).collect();
+        let Some(Cable { compliance, friction: Some([viscous, dry]) }) = cable(&load, &rubbed, &seen) else { panic!("rigid") };
+        assert!((compliance / 2e-5 - 1.0).abs() < 1e-6 && (viscous - 0.3).abs() < 1e-6 && (dry - 0.9).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_turns_with_the_velocity_alone_is_no_cable() {
+        let (load, rubbed) = motion();
+        let play: Vec<f64> = rubbed[1].iter().map(|sign| 1e-4 * sign).collect();
+        assert_eq!(cable(&load, &rubbed, &play), None);
+    }
+
+    #[test]
+    fn without_friction_none_is_told() {
+        let (load, rubbed) = motion();
+        let seen: Vec<f64> = load.iter().map(|load| 2e-5 * load).collect();
+        let Some(Cable { compliance, friction: None }) = cable(&load, &rubbed, &seen) else { panic!("rigid, or rubs") };
+        assert!((compliance / 2e-5 - 1.0).abs() < 1e-6);
+    }
 }

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, GROUND, OWN_STIFFNESS, TOOL_TWIST};
+use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, TOOL_TWIST};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -41,7 +41,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             all
         }
         // The vocabulary has a share of the friction only; how far a position drifts stands in the evidence.
-        ("thermal_drift", "position") => vec![named("T", "s", shaped("T"))],
+        ("thermal_drift", form) if DRIFTS.contains(&form) => vec![named("T", "s", shaped("T"))],
         ("thermal_drift", _) => {
             let friction = nominal.drives[joint][2];
             let share = (friction > 0.0).then(|| named("kappa_T", "1", -theta[0] / friction));
@@ -155,7 +155,7 @@ pub(crate) fn beside(
     let joint = family.joints.first().copied().unwrap_or(0);
     let (effort, position) = (robot.effort_unit(joint), robot.position_unit(joint));
     match (family.physics, family.form) {
-        ("thermal_drift", "position") => Some(("how far the position drifts until warm", theta[0], position)),
+        ("thermal_drift", form) if DRIFTS.contains(&form) => Some(("how far the position drifts until warm", theta[0], position)),
         ("thermal_drift", _) if nominal.drives[joint][2] <= 0.0 => Some(("how much friction changes until warm", theta[0], effort)),
         ("motor_torque_scale", form) if form.ends_with("offset") && robot.drives[joint].torque_per_count == 0.0 => {
             Some(("constant torque, of an amplifier whose counts are not known", theta[theta.len() - 1], effort))

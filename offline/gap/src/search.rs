@@ -518,7 +518,7 @@ impl Search<'_, '_> {
         let least = (ROUNDED * *best).max(3.0);
         let alike = |family: &Family| {
             family.joints == own.family.joints
-                && family.form == own.family.form
+                && family.side() == own.family.side()
                 && rounding.iter().all(|(name, _)| family.shape.contains(name))
         };
         for rival in rivals.iter_mut().filter(|rival| rival.score > least) {

@@ -1,6 +1,7 @@
 //! `ravenpose gap` as a user runs it: the four examples, cases made by the generator, bad input, gaps in the data.
 #![allow(missing_docs)]
 
+mod altered;
 mod common;
 mod document;
 mod examples;

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use arm::serial::{PARAMETERS, Workspace};
 use nalgebra::DMatrix;
 
+use crate::nominal::Evaluator;
 use crate::problem::{Channel, Problem};
 
 /// From when to when an effect is there, s from the start of each run; infinite where it does not begin or end in it.
@@ -79,6 +80,7 @@ pub struct Dictionary<'a> {
     /// Share of a strain of each drive's cable (column) that each joint sees.
     strain_shares: DMatrix<f64>,
     regressor: OnceLock<Vec<Vec<f64>>>,
+    links: OnceLock<[Vec<Vec<f64>>; 2]>,
 }
 
 impl<'a> Dictionary<'a> {
@@ -104,7 +106,7 @@ impl<'a> Dictionary<'a> {
             })
             .collect();
         let strain_shares = problem.robot.strain_shares();
-        Self { problem, grid, tip_jacobian, tip_rows, strain_shares, regressor: OnceLock::new() }
+        Self { problem, grid, tip_jacobian, tip_rows, strain_shares, regressor: OnceLock::new(), links: OnceLock::new() }
     }
 
     /// The arm's regressor at every grid row, N×10N row-major.
@@ -153,6 +155,23 @@ impl<'a> Dictionary<'a> {
     /// Load of a joint at the grid: what its links ask of the drives.
     pub fn load(&self, joint: usize) -> Vec<f64> {
         self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
+    }
+
+    /// What the links alone ask of a joint at the grid, without any friction: in their motion, or to be held where they are.
+    pub fn links_alone(&self, joint: usize, held: bool) -> Vec<f64> {
+        let of = |held: bool| {
+            let mut evaluator = Evaluator::new(self.problem.robot, self.problem.nominal);
+            let torques = self.grid.iter().map(|&(r, i, _)| {
+                let mut state = self.problem.pairs[r].real.link(i);
+                if held {
+                    state.velocity.fill(0.0);
+                    state.acceleration.fill(0.0);
+                }
+                evaluator.link(&state)
+            });
+            torques.collect::<Vec<_>>()
+        };
+        self.links.get_or_init(|| [of(false), of(true)])[usize::from(held)].iter().map(|torques| torques[joint]).collect()
     }
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.

@@ -25,24 +25,33 @@ const STATIC_EXCESS: f64 = 3.0;
 const SETTLING_S: [f64; 1] = [0.004];
 /// Time constants of heating, s.
 pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
-/// What warms up or creeps began so long before the recording, to begin with, s: a moment, since drives move before one records. Taken for none
-/// it bends what follows, and time constants of a recording's length come out half as long.
-pub(super) const BEFORE_S: f64 = 0.5;
-/// No longer, s: what has been under way for long is hardly told from what was always there.
-const BEFORE_MOST_S: f64 = 1.0;
+/// What warms up or creeps began so long before the recording, to begin with, s: a moment, since drives move before one records, or some
+/// seconds. Taken for none it bends what follows, and time constants of a recording's length come out half as long.
+pub(super) const BEFORE_S: [f64; 2] = [0.5, 4.0];
+/// No longer, s, and time constants: what has been under way for long is hardly told from what was always there.
+const BEFORE_MOST_S: f64 = 8.0;
+const BEFORE_MOST: f64 = 0.5;
 /// Its name in a shape.
 pub(crate) const BEFORE: &str = "before";
+
+const BY_LOAD: &str = "load_dependent_friction";
+/// Forms of friction before a cable, and behind it: for any load, that of the links alone, and their weight.
+pub(crate) const AT_MOTOR: [&str; 3] = ["motor side", "motor side, by its links", "motor side, by their weight"];
+const AT_LINK: [&str; 3] = ["link side", "link side, by its links", "link side, by their weight"];
+
+/// A load of a joint at the grid.
+type LoadOf = fn(&Dictionary, usize) -> Vec<f64>;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if !dictionary.problem.has(Channel::JointTorque) {
         return;
     }
     for j in 0..dictionary.joints() {
-        for (form, at_link) in [("motor side", false), ("link side", true)] {
+        for (forms, at_link) in [(AT_MOTOR, false), (AT_LINK, true)] {
             // On the link's side it loads the cable too; seldom told apart, and mostly small there.
             let penalty = if at_link { 1.0 } else { 0.0 };
             let mut families = Vec::new();
-            push_side(dictionary, j, form, at_link, &mut families);
+            push_side(dictionary, j, forms, at_link, &mut families);
             all.extend(families.into_iter().map(|f| {
                 let own = f.penalty_nats;
                 f.penalised(own + penalty)
@@ -51,8 +60,9 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
 }
 
-fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: bool, all: &mut Vec<Family>) {
+fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_link: bool, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
+    let form = forms[0];
     let travels = presliding(dictionary, j);
     // Before the cable it turns with the drive, which other joints' cables may move too, behind it with the joint.
     let velocity = move |d: &Dictionary| {
@@ -63,40 +73,39 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
     };
     let place = (j, at_link);
     let speed = size(&velocity(dictionary)).max(1e-9);
-    let by_load = move |d: &Dictionary, sign: &[f64]| {
-        let load: Vec<f64> = d.load(j).iter().map(|l| l.abs()).collect();
+    // What the pulleys carry: all of the cable's load, or what the links ask for in their motion, or to be held; a law is mostly written for one
+    // of the latter.
+    let mut loads: Vec<(&'static str, LoadOf, f64)> = vec![(form, |d, j| d.load(j), 0.0)];
+    if dictionary.problem.nominal.link_friction[j] != [0.0; 2] {
+        loads.push((forms[1], |d, j| d.links_alone(j, false), 1.0));
+    }
+    if size(&dictionary.links_alone(j, true)) > 1e-9 {
+        loads.push((forms[2], |d, j| d.links_alone(j, true), 1.0));
+    }
+    let by_load = move |d: &Dictionary, sign: &[f64], of: LoadOf| {
+        let load: Vec<f64> = of(d, j).iter().map(|l| l.abs()).collect();
         d.effort_of(j, times(sign, &load), at_link)
     };
     let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
     let speeds = (&[("v_eps", true)][..], product(&[&slowest]), by_speed as Turn);
     let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), by_travel as Turn);
+    let heated = product(&[&HEATING_S, &BEFORE_S]);
     for (names, starts, sign) in [speeds, bristles] {
         all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
             vec![d.effort_of(j, smooth(d, place, s, sign), at_link)]
         }));
-        all.push(
-            Family::shaped("load_dependent_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
-                vec![by_load(d, &smooth(d, place, s, sign))]
-            })
-            .penalised(1.0),
-        );
-        all.push(
-            Family::shaped(
-                "load_dependent_friction",
-                &[j],
-                form,
-                TORQUE,
-                &[positive, positive],
-                names,
-                starts.clone(),
-                move |d, s| {
-                    let sign = smooth(d, place, s, sign);
-                    vec![by_load(d, &sign), d.effort_of(j, sign, at_link)]
-                },
-            )
-            .penalised(3.0),
-        );
+        for &(form, of, more) in &loads {
+            let alone = move |d: &Dictionary, s: &[f64]| vec![by_load(d, &smooth(d, place, s, sign), of)];
+            let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive], names, starts.clone(), alone);
+            all.push(family.penalised(1.0 + more));
+            let with_level = move |d: &Dictionary, s: &[f64]| {
+                let sign = smooth(d, place, s, sign);
+                vec![by_load(d, &sign, of), d.effort_of(j, sign, at_link)]
+            };
+            let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive, positive], names, starts.clone(), with_level);
+            all.push(family.penalised(3.0 + more));
+        }
         if !at_link {
             all.push(
                 Family::shaped(
@@ -106,7 +115,7 @@ fn push_side(dictionary: &Dictionary, j: usize, form: &'static str, at_link: boo
                     TORQUE,
                     &[Bound::Free],
                     &[&[("T", true), (BEFORE, true)], names].concat(),
-                    HEATING_S.iter().flat_map(|t| starts.iter().map(move |s| [&[*t, BEFORE_S], &s[..]].concat())).collect(),
+                    heated.iter().flat_map(|heat| starts.iter().map(move |s| [heat, &s[..]].concat())).collect(),
                     move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],
                 )
                 .penalised(2.0),
@@ -176,15 +185,11 @@ fn stribeck(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), sh
     signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 
-/// How long before the recording a claim says that it began, s.
-pub(super) fn began_before(shape_s: f64) -> f64 {
-    shape_s.clamp(0.0, BEFORE_MOST_S)
-}
-
 /// `1 - exp(-h/T)` of a joint, h the time weighted by its squared torque over the mean square. Shape: T and how long before a run h was zero, s.
 pub(super) fn heat(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64> {
     // Faster heating is no heating: it would pass for a constant.
-    let (heating_s, before_s) = (shape[0].max(HEATING_S[0]), began_before(shape[1]));
+    let heating_s = shape[0].max(HEATING_S[0]);
+    let before_s = shape[1].clamp(0.0, BEFORE_MOST_S.min(BEFORE_MOST * heating_s));
     let squares = dictionary.at_grid(|r, i, k| {
         let problem = dictionary.problem;
         let torque = problem.pairs[r].real.torque.as_ref().map_or(problem.loads[r][k].motor[j], |torque| torque[j][i]);

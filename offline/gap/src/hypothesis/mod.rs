@@ -12,7 +12,7 @@ mod transmission;
 mod unknown;
 
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
-pub(crate) use transmission::{GROUND, LATE_COUPLING};
+pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
 pub use unknown::UNMODELLED;
 pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 
@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub use dictionary::{Column, Dictionary, Window};
 pub(crate) use environment::WALL;
 pub use environment::direction;
-pub(crate) use friction::BEFORE;
+pub(crate) use friction::{AT_MOTOR, BEFORE};
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST};
 
@@ -234,6 +234,11 @@ impl Family {
         self.least = least;
         self.apart = Some(Arc::new(move |dictionary, _| parts(dictionary)));
         self
+    }
+
+    /// Which form of it, without what it depends on.
+    pub fn side(&self) -> &'static str {
+        self.form.split(',').next().unwrap_or(self.form)
     }
 
     /// Less likely than its rivals by so much, before any data.

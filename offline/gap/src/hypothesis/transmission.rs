@@ -1,8 +1,9 @@
 //! What lies between motor and joint: play, stretch, hysteresis, creep, coupling, ratio, eccentric pulleys, offsets.
 
 use super::dictionary::{Dictionary, minus, size, times};
-use super::friction::{BEFORE, BEFORE_S, HEATING_S, began_before, heat};
+use super::friction::{BEFORE, BEFORE_S, HEATING_S, heat};
 use super::{Bound, Column, Family, hysteresis, product};
+use crate::nominal::Evaluator;
 use crate::problem::Channel;
 use crate::run::Run;
 
@@ -18,12 +19,18 @@ const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// The form of a coupling by a cable that has play itself.
 pub(crate) const LATE_COUPLING: &str = "position, with play";
+/// Forms of a position that drifts.
+pub(crate) const DRIFTS: [&str; 2] = ["position", "position, under way"];
+/// The zero of what measures the joint itself.
+pub(crate) const SENSOR: &str = "of the sensor at the joint";
 /// A spring to the ground whose force has a memory.
 pub(crate) const GROUND: &str = "to the ground";
 /// Times the furthest that a joint is seen, and the range that it has, within which it was homed.
 const HOMED: f64 = 2.0;
 /// Time constants of creep, s.
 const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
+/// How many time constants before a recording it may have begun; earlier it has settled.
+const BEGUN: f64 = 2.0;
 /// How many of the time constants are tried where it was under way: of the longer ones the start is but an offset.
 const UNDER_WAY: usize = 6;
 /// Over so many time constants its load is averaged where its past is not known.
@@ -163,10 +170,10 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
     hysteresis::push(dictionary, j, usual, all);
-    let fresh: Settled = |s| 1.0 - (-began_before(s[1]) / s[0]).exp();
+    let begun: Settled = |s| 1.0 - (-s[1].clamp(0.0, BEGUN * s[0]) / s[0]).exp();
     for (form, shape, grid, settled) in [
         ("settled at the start", &[("T_k", true)][..], product(&[&CREEP_S]), (|_| 1.0) as Settled),
-        ("fresh at the start", &[("T_k", true), (BEFORE, true)], product(&[&CREEP_S, &[BEFORE_S]]), fresh),
+        ("begun before the start", &[("T_k", true), (BEFORE, true)], product(&[&CREEP_S, &BEFORE_S]), begun),
     ] {
         let columns = move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], settled(s)))];
         let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &[Bound::Positive], shape, grid, columns);
@@ -190,19 +197,24 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         );
         all.push(family.penalised(4.0));
     }
-    all.push(
-        Family::shaped(
-            "thermal_drift",
-            &[j],
-            "position",
-            TRANSMISSION,
-            &[Bound::Free],
-            &[("T", true), (BEFORE, true)],
-            product(&[&HEATING_S, &[BEFORE_S]]),
-            move |d, s| vec![d.strain_of(j, heat(d, j, s))],
-        )
-        .penalised(3.0),
-    );
+    // Within seconds creep is likelier.
+    for (form, before, penalty) in [(DRIFTS[0], BEFORE_S[0], 3.0), (DRIFTS[1], BEFORE_S[1], 6.0)] {
+        let grid = product(&[&HEATING_S, &[before]]);
+        let most = 2.0 * before;
+        all.push(
+            Family::shaped(
+                "thermal_drift",
+                &[j],
+                form,
+                TRANSMISSION,
+                &[Bound::Free],
+                &[("T", true), (BEFORE, true)],
+                grid,
+                move |d, s| vec![d.strain_of(j, heat(d, j, &[s[0], s[1].min(most)]))],
+            )
+            .penalised(penalty),
+        );
+    }
 }
 
 /// Load behind a first-order lag, which at the start of a run is where it stood so long that it settled to this share of its load. Of the
@@ -307,6 +319,31 @@ fn offset(dictionary: &Dictionary, j: usize) -> Column {
     dictionary.deflection_of(j, vec![-1.0; dictionary.grid.len()])
 }
 
+/// The sensor at a joint tells 1 more than there is: what it is compared with, the tip and the load that go with it are elsewhere.
+fn sensor_off(dictionary: &Dictionary, j: usize) -> Column {
+    const STEP: f64 = 1e-3;
+    let problem = dictionary.problem;
+    let mut evaluator = Evaluator::new(problem.robot, problem.nominal);
+    let mut torques = vec![Vec::with_capacity(dictionary.grid.len()); dictionary.joints()];
+    for &(r, i, _) in &dictionary.grid {
+        let mut state = problem.pairs[r].real.link(i);
+        let told = evaluator.link(&state);
+        state.position[j] -= STEP;
+        let there = evaluator.link(&state);
+        torques.iter_mut().zip(there.iter().zip(told)).for_each(|(column, (there, told))| column.push((there - told) / STEP));
+    }
+    let torques: Vec<Option<Vec<f64>>> = torques.into_iter().map(Some).collect();
+    let mut column = offset(dictionary, j);
+    for part in [
+        dictionary.effort(&torques, false),
+        dictionary.tip(|_, _, row| [0, 1, 2].map(|axis| -dictionary.tip_jacobian[row][axis * dictionary.joints() + j])),
+    ] {
+        column.parts.extend(part.parts);
+    }
+    column.parts.sort_by_key(|(cell, _)| *cell);
+    column
+}
+
 /// How far from zero a joint may have been homed, rad or m: what would be 0 further away is no error that grows with the way, but an offset.
 fn homed_within(dictionary: &Dictionary, j: usize) -> f64 {
     let furthest = position(dictionary, j).iter().fold(0.0, |most: f64, q| most.max(q.abs()));
@@ -317,6 +354,11 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
     let (small, free, homed) = (Bound::Between(-0.5, 0.5), Bound::Free, Bound::Within(homed_within(dictionary, j)));
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
+    if dictionary.problem.tip_from_truth {
+        // Where the links and the tip are taken to be is off as well.
+        let family = Family::fixed("joint_offset", &[j], SENSOR, TRANSMISSION, &[free], move |d| vec![sensor_off(d, j)]);
+        all.push(family.penalised(1.0));
+    }
     all.push(
         Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5),
     );

@@ -25,6 +25,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     for j in 0..dictionary.joints() {
         if dictionary.problem.cell(Channel::JointTorque, j).is_some() {
             push_friction(dictionary, j, all);
+            push_spring(j, all);
         }
         if let Some(cell) = dictionary.problem.cell(Channel::Transmission, j) {
             push_cable(dictionary, j, all);
@@ -62,6 +63,19 @@ fn push_friction(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let family =
         Family::shaped(UNMODELLED, &[j], "friction and position", TORQUE, &[free, free], &period, product(&[&periods]), waves);
     all.push(family.penalised(9.0));
+}
+
+/// What pulls a joint to a place, as a hose or a lead does, behind its cable or before it.
+fn push_spring(j: usize, all: &mut Vec<Family>) {
+    for (form, at_link, penalty) in [("position", true, 8.0), ("position, before the cable", false, 9.0)] {
+        let pull = move |d: &Dictionary| {
+            let q = d.at_grid(|r, i, _| d.problem.pairs[r].real.position[j][i]);
+            let constant = vec![1.0; q.len()];
+            vec![d.effort_of(j, q, at_link), d.effort_of(j, constant, at_link)]
+        };
+        let family = Family::fixed(UNMODELLED, &[j], form, Channel::JointTorque, &[Bound::Free, Bound::Free], pull);
+        all.push(family.penalised(penalty));
+    }
 }
 
 /// A cable whose stiffness changes with its load: bent one way, or softer beyond a load.

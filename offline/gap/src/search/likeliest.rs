@@ -1,7 +1,7 @@
 //! Which of the claims that predict about alike is taken: the likeliest, which is mostly the simplest.
 
 use super::Scored;
-use crate::hypothesis::{Candidate, HARDENING, UNMODELLED, rounds};
+use crate::hypothesis::{Candidate, DRIFTS, HARDENING, UNMODELLED, rounds};
 use crate::linear::dot;
 use crate::robot::Robot;
 
@@ -12,7 +12,7 @@ const HOLDS: [(&str, &[&str], &str, f64); 4] = [
     (UNMODELLED, &HARDENING, "cable_stretch", 0.02),
     ("cable_hysteresis", &[], "cable_stretch", 0.01),
     // A drift that has come to its end before it is there is an offset; a cable that slips takes a moment to settle.
-    ("thermal_drift", &["position"], "joint_offset", 0.05),
+    ("thermal_drift", &DRIFTS, "joint_offset", 0.05),
 ];
 
 /// The share by which a claim has to be better than one that it holds; none where it holds it not.
