@@ -6,6 +6,7 @@ mod memory;
 use crate::output;
 use ::gap::analysis::{Given, Options, Outcome, analyse};
 use ::gap::needed::keep_needed;
+use ::gap::parallel;
 use ::gap::search::Thresholds;
 use ::gap::verdicts::{sha256, sha256_of};
 use ::gap::watch;
@@ -54,18 +55,23 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     }
     output::check_folder(wish.out)?;
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
-    let mut given = Vec::new();
-    for (k, path) in wish.real.iter().enumerate() {
+    let read = |path: &Path| {
         let mut notes = Vec::new();
-        let mut read = |path: &Path| {
-            let mut recording = read(path, model.side(), &mut notes)?;
-            keep_needed(&mut recording, &model);
-            Ok::<_, String>(recording)
-        };
-        let real = read(path)?;
-        let sim = wish.sim.get(k).map(|path| Ok::<_, String>((read(path)?, hash(path)?))).transpose()?;
-        given.push(Given { id: name(path, k, wish.real), real, real_sha256: hash(path)?, notes, sim });
-    }
+        let mut recording = read(path, model.side(), &mut notes)?;
+        keep_needed(&mut recording, &model);
+        Ok::<_, String>((recording, hash(path)?, notes))
+    };
+    let read = |(k, path): (usize, &PathBuf)| {
+        let (real, sim) = parallel::both(|| read(path), || wish.sim.get(k).map(|path| read(path)).transpose());
+        let (real, real_sha256, mut notes) = real?;
+        let sim = sim?.map(|(sim, sha256, of_sim)| {
+            notes.extend(of_sim);
+            (sim, sha256)
+        });
+        Ok(Given { id: name(path, k, wish.real), real, real_sha256, notes, sim })
+    };
+    // Of several that cannot be read the first one is told.
+    let given = parallel::map(wish.real.iter().enumerate(), read).into_iter().collect::<Result<Vec<Given>, String>>()?;
     let text = model.to_toml();
     let thresholds = Thresholds::default();
     let urdf = wish.robot.filter(|robot| Path::new(robot).extension().is_some_and(|end| end.eq_ignore_ascii_case("urdf")));

@@ -18,7 +18,7 @@ use crate::robot::Robot;
 use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::unexplained::Unexplained;
-use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, unexplained, verdicts};
+use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, parallel, unexplained, verdicts};
 
 /// One run as it was given.
 #[derive(Debug)]
@@ -200,8 +200,7 @@ pub fn analyse(
     options: &Options,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Outcome, AnalysisError> {
-    let simulated: Vec<_> =
-        given.iter().map(|one| if one.sim.is_some() { None } else { builtin::simulated(model, &one.real) }).collect();
+    let simulated = parallel::map(given, |one| if one.sim.is_some() { None } else { builtin::simulated(model, &one.real) });
     let at_its_word = analyse_with(model, given, options, (&simulated, true), progress)?;
     let stands_in = simulated.iter().any(Option::is_some);
     if !stands_in || reaches_floor(&at_its_word.report) {
@@ -210,7 +209,7 @@ pub fn analyse(
     progress("the robot's numbers, believed roughly");
     // The numbers are taken roughly, but the model's own effects are there.
     let along = |one: &Given| builtin::along_motion(model, &one.real).ok();
-    let effects: Vec<_> = if model.effects().is_empty() { Vec::new() } else { given.iter().map(along).collect() };
+    let effects: Vec<_> = if model.effects().is_empty() { Vec::new() } else { parallel::map(given, along) };
     let roughly = analyse_with(model, given, options, (&effects, false), progress)?;
     let unexplained = |outcome: &Outcome| match outcome.report.status {
         Status::NoMismatch | Status::Explained | Status::InsufficientData => 0,
@@ -334,9 +333,12 @@ fn analyse_with(
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     progress("smoothing");
-    let pair = |(real, sim): Both| Pair { real: Motion::new(real, band), sim: sim.map(|sim| Motion::new(sim, band)) };
-    let train: Vec<Pair> = train.into_iter().map(pair).collect();
-    let held: Vec<Pair> = held.into_iter().map(pair).collect();
+    let pair = |(real, sim): Both| {
+        let (real, sim) = parallel::both(|| Motion::new(real, band), || sim.map(|sim| Motion::new(sim, band)));
+        Pair { real, sim }
+    };
+    let train: Vec<Pair> = parallel::map(train, pair);
+    let held: Vec<Pair> = parallel::map(held, pair);
     let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
     if seen_s < 0.5 * SHORTEST_S || train.iter().chain(&held).any(|pair| pair.real.rows.len() < LEAST_ROWS) {
         quality.insert(0, too_few(seen_s));
@@ -443,7 +445,7 @@ fn analyse_with(
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
-    outcome.report.timing.threads = Some(2);
+    outcome.report.timing.threads = u64::try_from(parallel::cores()).ok();
     Ok(outcome)
 }
 

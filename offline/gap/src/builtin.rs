@@ -20,7 +20,10 @@ pub fn simulated(model: &RobotModel, recording: &Recording) -> Option<Recording>
 /// # Errors
 /// What keeps it from being simulated, in one line.
 pub fn along_commands(model: &RobotModel, recording: &Recording, from_s: f64) -> Result<Recording, String> {
-    along(model, recording, |run| closed_loop(model, &run, ClosedLoop { from_s, ..ClosedLoop::default() }))
+    along(model, recording, |mut run| {
+        run.keep_commands();
+        closed_loop(model, &run, ClosedLoop { from_s, ..ClosedLoop::default() })
+    })
 }
 
 /// The model driven by the recorded torque, started anew from the recorded state after every `window_s`, told from `from_s` on.

@@ -12,6 +12,7 @@ use crate::builtin::{along_commands, along_torque};
 use crate::floors::floor;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
+use crate::parallel;
 use crate::problem::{Cell, Channel};
 use crate::robot::Robot;
 use crate::run::{Run, common};
@@ -41,7 +42,7 @@ struct Played {
 }
 
 /// What the simulator makes of a recording, from so long after its first row on, s; one line where it cannot.
-type Play = dyn Fn(&RobotModel, &Recording, f64) -> Result<Recording, String>;
+type Play = dyn Fn(&RobotModel, &Recording, f64) -> Result<Recording, String> + Sync;
 /// Told before what was held out begins, s: no sample of it lies at the edge.
 const EARLIER_S: f64 = 0.1;
 
@@ -95,11 +96,13 @@ fn played(
     runs.map(|(pair, given)| {
         let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
         let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
-        let (before, after) = (of(models.0)?, of(models.1)?);
+        let (before, after) = parallel::both(|| of(models.0), || of(models.1));
+        let (before, after) = (before?, after?);
         let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
         let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);
         let smooth = |run: Run| Motion::new(run, band);
-        Ok(Played { real: smooth(real), before: smooth(before), after: smooth(after) })
+        let (real, (before, after)) = parallel::both(|| smooth(real), || parallel::both(|| smooth(before), || smooth(after)));
+        Ok(Played { real, before, after })
     })
     .collect()
 }

@@ -2,6 +2,7 @@
 
 use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, START, Window, rounds};
 use crate::nominal::{Nominal, rms};
+use crate::parallel;
 use crate::parameters::{Named, parameters};
 use crate::refine;
 use crate::robot::Robot;
@@ -273,7 +274,7 @@ pub(crate) fn slopes_of(dictionary: &Dictionary, candidate: &Candidate, theta: &
         (Some(run), Some(together)) => together.of_run(dictionary.problem, run),
         _ => slope(dictionary, candidate, theta, &[*k]),
     };
-    numbers.iter().map(of_number).collect()
+    parallel::map(numbers, of_number)
 }
 
 /// Change of the effect per unit by which some numbers of its shape are moved.
@@ -288,7 +289,8 @@ fn slope(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], numbers:
         }
         Candidate::new(dictionary, family, &shape, candidate.window)
     };
-    difference(&at(1.0), &at(-1.0), theta, 2.0 * step)
+    let (there, here) = parallel::both(|| at(1.0), || at(-1.0));
+    difference(&there, &here, theta, 2.0 * step)
 }
 
 fn difference(there: &Candidate, here: &Candidate, theta: &[f64], step: f64) -> Column {

@@ -6,6 +6,7 @@ use crate::analysis::Given;
 use crate::builtin::along_motion;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
+use crate::parallel;
 use crate::problem::{Cell, Channel, Problem, held};
 use crate::robot::Robot;
 use crate::run::{Run, common};
@@ -75,15 +76,13 @@ fn own_error(error: &ModelError, cell: &Cell) -> f64 {
 
 /// What a model leaves of simulations that it was learnt from: RMS in each channel, where the drives move.
 pub(crate) fn model_error(model: &RobotModel, robot: &Robot, given: &[Given], band: Band) -> ModelError {
-    let pairs: Vec<[Motion; 2]> = given
-        .iter()
-        .filter_map(|one| {
-            let (sim, _) = one.sim.as_ref()?;
-            let of = |recording| Run::new(recording, robot).ok();
-            let (sim, own) = common(&of(sim)?, &of(&along_motion(model, sim).ok()?)?).ok()?;
-            Some([sim, own].map(|run| Motion::new(run, band)))
-        })
-        .collect();
+    let both = |one: &Given| {
+        let (sim, _) = one.sim.as_ref()?;
+        let of = |recording| Run::new(recording, robot).ok();
+        let (sim, own) = common(&of(sim)?, &of(&along_motion(model, sim).ok()?)?).ok()?;
+        Some([sim, own].map(|run| Motion::new(run, band)))
+    };
+    let pairs: Vec<[Motion; 2]> = parallel::map(given, both).into_iter().flatten().collect();
     let of = |channel: Channel, count: usize| -> Vec<f64> {
         let left = |index: usize| {
             pairs.iter().flat_map(move |[sim, own]| {
@@ -109,7 +108,8 @@ fn both(model: &RobotModel, bare: &RobotModel, robot: &Robot, given: &Given, rea
         // Rows of the problem count from the start of its own run.
         (real.len() == sim.len()).then(|| Motion::new(sim, band))
     };
-    Some([of(model)?, of(bare)?])
+    let (with, without) = parallel::both(|| of(model), || of(bare));
+    Some([with?, without?])
 }
 
 fn value(motion: &Motion, channel: Channel, index: usize, i: usize) -> Option<f64> {

@@ -35,6 +35,7 @@ mod gates;
 pub mod held_out;
 mod known;
 pub mod needed;
+pub mod parallel;
 mod past;
 mod pictures;
 mod regime;

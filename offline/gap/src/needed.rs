@@ -31,6 +31,8 @@ pub fn keep_needed(recording: &mut Recording, model: &RobotModel) {
     let mapped = |name: &str| model.columns.iter().any(|column| column.source == name);
     recording.columns.retain(|column| needed(&column.name) || mapped(&column.name));
     recording.texts.clear();
+    // Read row by row, each has room for up to as many again.
+    recording.columns.iter_mut().for_each(|column| column.values.shrink_to_fit());
 }
 
 /// A name up to the number of the joint, and that number.

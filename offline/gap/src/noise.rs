@@ -47,11 +47,10 @@ impl Noise {
     /// Innovations of one segment; the first ones, whose past is not there, are left out as zeros.
     pub fn whiten(&self, segment: &[f64], out: &mut Vec<f64>) {
         let order = self.coefficients.len();
-        out.extend((0..segment.len()).map(|k| {
-            if k < order {
-                return 0.0;
-            }
-            segment[k] - self.coefficients.iter().enumerate().map(|(i, p)| p * segment[k - 1 - i]).sum::<f64>()
+        out.extend(std::iter::repeat_n(0.0, order.min(segment.len())));
+        out.extend(segment.windows(order + 1).map(|last| {
+            let (past, now) = (&last[..order], last[order]);
+            now - self.coefficients.iter().zip(past.iter().rev()).map(|(p, x)| p * x).sum::<f64>()
         }));
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::hypothesis::{BEFORE, Candidate, Dictionary, Family, GROUND};
+use crate::parallel;
 
 /// Halvings of a step before a number is settled.
 const HALVINGS: usize = 7;
@@ -22,20 +23,13 @@ const CHOICES: usize = 4;
 pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidate> {
     let points: Vec<(&Arc<Family>, &Vec<f64>)> =
         families.iter().flat_map(|family| family.grid.iter().map(move |shape| (family, shape))).collect();
-    let make = |part: &[(&Arc<Family>, &Vec<f64>)]| -> Vec<Candidate> {
-        part.iter().map(|(family, shape)| Candidate::new(dictionary, family, shape, None)).filter(Candidate::shows).collect()
-    };
-    let (left, right) = points.split_at(points.len() / 2);
-    std::thread::scope(|scope| {
-        let other = scope.spawn(|| make(right));
-        let mut all = make(left);
-        all.extend(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        all
-    })
+    let mut all = parallel::map(points, |(family, shape)| Candidate::new(dictionary, family, shape, None));
+    all.retain(Candidate::shows);
+    all
 }
 
 /// Misfit of a candidate and its coefficients; infinite where they may not be.
-pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + 'a;
+pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + Sync + 'a;
 
 /// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least, and with the choice
 /// that is best then.
@@ -65,7 +59,8 @@ pub fn chosen_otherwise(dictionary: &Dictionary, of: &Candidate, fitted: &Fitted
         Candidate::new(dictionary, family, &shape, of.window)
     };
     let all = family.choices.iter().flat_map(|&k| family.other_choices(k, of.shape[k]).into_iter().map(move |value| (k, value)));
-    all.map(|(k, value)| with(k, value)).filter(Candidate::shows).map(|start| settled(dictionary, &start, fitted)).collect()
+    let starts: Vec<Candidate> = all.map(|(k, value)| with(k, value)).filter(Candidate::shows).collect();
+    parallel::map(starts, |start| settled(dictionary, &start, fitted))
 }
 
 /// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least.
@@ -126,16 +121,18 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
 
 /// The edges of a window moved to where the misfit is least.
 pub fn edges_moved(dictionary: &Dictionary, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {
-    let family = best.family.clone();
+    // The shape stays, and what it costs to make is paid once.
+    let mut whole: Option<Candidate> = None;
     for edge in 0..2 {
         let Some(window) = best.window.filter(|window| window[edge].is_finite()) else { continue };
+        let whole = whole.get_or_insert_with(|| Candidate::new(dictionary, &best.family, &best.shape, None));
         let mut step = EDGE_S * window[edge].clamp(1.0, 8.0);
         for _ in 0..HALVINGS + 2 {
             for sign in [-1.0, 1.0] {
                 let mut moved = best.window.unwrap_or(window);
                 moved[edge] += sign * step;
                 if moved[0] < moved[1] && moved[edge] > 0.0 {
-                    try_one(Candidate::new(dictionary, &family, &best.shape, Some(moved)), best, least, misfit);
+                    try_one(whole.within(dictionary.problem, moved), best, least, misfit);
                 }
             }
             step *= 0.5;

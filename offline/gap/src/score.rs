@@ -1,5 +1,8 @@
 //! Held-out likelihood of sets of candidates, from Gram matrices per cell and block.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::hypothesis::{Bound, Candidate, Column};
@@ -18,6 +21,8 @@ pub struct Scorer<'a> {
     noise: Vec<Noise>,
     beside: Vec<Projection>,
     whitened: Vec<Vec<f64>>,
+    /// Rows of a block that follow each other, with the block, per cell.
+    stretches: Vec<Vec<(Range<usize>, usize)>>,
     /// Rows that count as one, per cell.
     pub correlation: Vec<f64>,
 }
@@ -28,7 +33,8 @@ pub struct Grams {
     columns: usize,
     /// `[cell][block]`, (p+1)×(p+1).
     sums: Vec<Vec<DMatrix<f64>>>,
-    parts: Vec<Parts>,
+    /// Shared with the grams that have more columns.
+    parts: Vec<Arc<Parts>>,
 }
 
 impl Grams {
@@ -65,6 +71,8 @@ pub struct Fit {
     pub without: Vec<Vec<f64>>,
 }
 
+/// Series that a column is multiplied with at once: each sum waits for its own last term only.
+const SIDE_BY_SIDE: usize = 4;
 /// Blocks without which their scatter is not taken for known.
 const ENOUGH_BLOCKS: usize = 5;
 
@@ -98,14 +106,15 @@ impl<'a> Scorer<'a> {
             })
             .collect();
         whitened.iter_mut().zip(&beside).for_each(|(y, beside)| beside.apply(y));
-        Self { problem, noise, beside, whitened, correlation }
+        let stretches = problem.blocks.iter().map(|blocks| stretches(blocks)).collect();
+        Self { problem, noise, beside, whitened, stretches, correlation }
     }
 
     /// Residual of a fit, whitened, per cell.
     pub fn left(&self, grams: &Grams, fit: &Fit) -> Vec<Vec<f64>> {
         let mut left = self.whitened.clone();
         for (parts, theta) in grams.parts.iter().zip(&fit.coefficients) {
-            for (c, values) in parts {
+            for (c, values) in parts.iter() {
                 left[*c].iter_mut().zip(values).for_each(|(y, x)| *y -= theta * x);
             }
         }
@@ -157,7 +166,7 @@ impl<'a> Scorer<'a> {
     pub fn extended(&self, grams: &Grams, columns: &[Column]) -> Grams {
         let (old, new) = (grams.columns, columns.len());
         let p = old + new;
-        let fresh: Vec<Parts> = columns.iter().map(|column| self.parts(column)).collect();
+        let fresh: Vec<Arc<Parts>> = columns.iter().map(|column| Arc::new(self.parts(column))).collect();
         let mut sums: Vec<Vec<DMatrix<f64>>> = grams
             .sums
             .iter()
@@ -184,22 +193,21 @@ impl<'a> Scorer<'a> {
             })
             .collect();
         for (k, parts) in fresh.iter().enumerate() {
-            for (c, values) in parts {
-                let blocks = &self.problem.blocks[*c];
-                let mut add = |other: usize, series: &[f64]| {
-                    let mut totals = vec![0.0; self.problem.block_count];
-                    for ((x, y), b) in values.iter().zip(series).zip(blocks) {
-                        totals[*b] += x * y;
-                    }
-                    for (b, total) in totals.into_iter().enumerate() {
-                        sums[*c][b][(old + k, other)] = total;
-                        sums[*c][b][(other, old + k)] = total;
-                    }
-                };
-                add(p, &self.whitened[*c]);
-                for (other, parts) in grams.parts.iter().chain(&fresh[..=k]).enumerate() {
-                    if let Some((_, series)) = parts.iter().find(|(cell, _)| cell == c) {
-                        add(other, series);
+            for (c, values) in parts.iter() {
+                let before = grams.parts.iter().chain(&fresh[..=k]).enumerate();
+                let in_cell = before.filter_map(|(other, parts)| {
+                    let (_, series) = parts.iter().find(|(cell, _)| cell == c)?;
+                    Some((other, series.as_slice()))
+                });
+                let others: Vec<(usize, &[f64])> = [(p, self.whitened[*c].as_slice())].into_iter().chain(in_cell).collect();
+                for some in others.chunks(SIDE_BY_SIDE) {
+                    let series: [&[f64]; SIDE_BY_SIDE] = std::array::from_fn(|s| some.get(s).unwrap_or(&some[0]).1);
+                    let totals = self.products(*c, values, series);
+                    for (s, (other, _)) in some.iter().enumerate() {
+                        for (sums, total) in sums[*c].iter_mut().zip(&totals) {
+                            sums[(old + k, *other)] = total[s];
+                            sums[(*other, old + k)] = total[s];
+                        }
                     }
                 }
             }
@@ -207,6 +215,22 @@ impl<'a> Scorer<'a> {
         let mut parts = grams.parts.clone();
         parts.extend(fresh);
         Grams { columns: p, sums, parts }
+    }
+
+    /// Sums of products of a column with some series in a cell, per block.
+    fn products(&self, cell: usize, values: &[f64], series: [&[f64]; SIDE_BY_SIDE]) -> Vec<[f64; SIDE_BY_SIDE]> {
+        let mut totals = vec![[0.0; SIDE_BY_SIDE]; self.problem.block_count];
+        for (rows, block) in &self.stretches[cell] {
+            let mut sums = totals[*block];
+            let there = series.map(|series| &series[rows.clone()]);
+            for (i, x) in values[rows.clone()].iter().enumerate() {
+                for (sum, series) in sums.iter_mut().zip(there) {
+                    *sum += x * series[i];
+                }
+            }
+            totals[*block] = sums;
+        }
+        totals
     }
 
     /// Fits, and predicts each block from the others.
@@ -383,8 +407,18 @@ pub(crate) fn whiten(problem: &Problem, noise: &Noise, cell: usize, series: &[f6
     out
 }
 
+/// Rows that follow each other in the same block.
+fn stretches(blocks: &[usize]) -> Vec<(Range<usize>, usize)> {
+    let mut start = 0;
+    let of = |same: &[usize]| {
+        start += same.len();
+        (start - same.len()..start, same[0])
+    };
+    blocks.chunk_by(|a, b| a == b).map(of).collect()
+}
+
 /// Rows of a cell, run by run.
-pub fn segments(problem: &Problem, cell: usize) -> Vec<std::ops::Range<usize>> {
+pub fn segments(problem: &Problem, cell: usize) -> Vec<Range<usize>> {
     let rows = &problem.cells[cell].rows;
     let mut all = Vec::new();
     let mut start = 0;

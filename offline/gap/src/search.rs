@@ -10,6 +10,7 @@ use likeliest::{likeliest_first, simpler_is_enough};
 
 use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
 use crate::noise::Noise;
+use crate::parallel;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
@@ -288,7 +289,6 @@ impl Search<'_, '_> {
     /// by the number of rows that count as one; whichever says more. Noise that an effect only seems to explain stays in
     /// what it leaves, and is whitened away.
     fn significance(&self, others: &[Candidate], candidate: &Candidate) -> Gain {
-        let mut best: Option<Gain> = None;
         let all = |scorer: &Scorer| {
             let base = others.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
             let with = scorer.extended(&base, &candidate.columns);
@@ -298,7 +298,7 @@ impl Search<'_, '_> {
         let noise = self.noise_left(others, candidate, &self.scorer.fit(&with));
         let shown = candidate.blocks(self.problem);
         let edges = candidate.blocks_of_edges(self.problem);
-        for noise in [window_noise(self.problem), noise] {
+        let with_noise = |noise: Vec<Noise>| {
             let mut scorer = Scorer::new(self.problem, noise);
             let (base, with) = all(&scorer);
             let (before, after) = (scorer.fit(&base), scorer.fit(&with));
@@ -310,11 +310,10 @@ impl Search<'_, '_> {
                 gain.explained = gain.explained.max(between.explained);
                 gain.ranks = gain.ranks.max(between.ranks);
             }
-            if best.is_none_or(|b| gain.nats > b.nats) {
-                best = Some(gain);
-            }
-        }
-        best.unwrap_or(Gain { nats: 0.0, error: 0.0, least: 0.0, explained: 0.0, ranks: 0.0 })
+            gain
+        };
+        let (of_window, left) = parallel::both(|| with_noise(window_noise(self.problem)), || with_noise(noise));
+        if left.nats > of_window.nats { left } else { of_window }
     }
 
     /// Autoregression of what a set leaves, per cell.
@@ -452,9 +451,8 @@ impl Search<'_, '_> {
         // Between the grid's points, for those that may win; an edge that is off costs what is right more than what bends.
         let best = claims.first().map_or(0.0, |s| s.score);
         let worth = claims.iter_mut().enumerate().filter(|(k, s)| *k < if s.candidate.edges() > 0 { 12 } else { 6 });
-        for (_, scored) in worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best) {
-            self.settle_shape(grams, &base, scored);
-        }
+        let worth: Vec<_> = worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best).collect();
+        let _ = parallel::map(worth, |(_, scored)| self.settle_shape(grams, &base, scored));
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
@@ -500,9 +498,7 @@ impl Search<'_, '_> {
         let mut forms = distinct_by(&forms, Candidate::same_form);
         forms.retain(|s| s.score > NEAR_IN_WINDOW * best.score);
         forms.truncate(FORMS_IN_WINDOW);
-        for scored in &mut forms {
-            self.settle_shape(grams, base, scored);
-        }
+        let _ = parallel::map(&mut forms, |scored| self.settle_shape(grams, base, scored));
         forms.iter().filter(|form| !simpler_is_enough(form, claims.iter().chain(&forms))).cloned().collect()
     }
 
@@ -521,7 +517,7 @@ impl Search<'_, '_> {
                 && family.side() == own.family.side()
                 && rounding.iter().all(|(name, _)| family.shape.contains(name))
         };
-        for rival in rivals.iter_mut().filter(|rival| rival.score > least) {
+        let again = |rival: &mut Scored| {
             let mut starts: Vec<Candidate> = Vec::new();
             for start in self.candidates.iter().filter(|start| start.same_claim(&rival.candidate) && alike(&start.family)) {
                 let mut shape = start.shape.clone();
@@ -536,12 +532,13 @@ impl Search<'_, '_> {
                 }
             }
             let scored = starts.iter().filter(|start| start.shows()).filter_map(|start| self.score(grams, base, start));
-            let Some(mut again) = scored.max_by(|a, b| a.score.total_cmp(&b.score)) else { continue };
+            let Some(mut again) = scored.max_by(|a, b| a.score.total_cmp(&b.score)) else { return };
             self.settle_shape(grams, base, &mut again);
             if again.score > rival.score {
                 *rival = again;
             }
-        }
+        };
+        let _ = parallel::map(rivals.iter_mut().filter(|rival| rival.score > least), again);
     }
 
     /// Moves a candidate between the grid's points, where that is better.
@@ -568,10 +565,9 @@ impl Search<'_, '_> {
         let fit = self.scorer.fit(&grams(&self.scorer, Some(&best.candidate)));
         let scorer = Scorer::new(self.problem, self.noise_left(others, &best.candidate, &fit));
         let base = scorer.fit(&grams(&scorer, None));
-        let over: Vec<f64> = claims[..close]
-            .iter()
-            .map(|s| scorer.gain(&base, &scorer.fit(&grams(&scorer, Some(&s.candidate)))).nats - price(&s.candidate))
-            .collect();
+        let over: Vec<f64> = parallel::map(&claims[..close], |s| {
+            scorer.gain(&base, &scorer.fit(&grams(&scorer, Some(&s.candidate)))).nats - price(&s.candidate)
+        });
         let most = over.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if most <= 0.0 {
             return;
@@ -696,27 +692,31 @@ fn best_claims(count: usize, score: &(dyn Fn(usize) -> Option<Scored> + Sync)) -
     best_of(count, Candidate::same_claim, score)
 }
 
+/// Candidates that are scored by one core before it takes others.
+const PART: usize = 32;
+
 /// The same of every kind of candidate: of those that are the same.
 fn best_of(
     count: usize,
     same: fn(&Candidate, &Candidate) -> bool,
     score: &(dyn Fn(usize) -> Option<Scored> + Sync),
 ) -> Vec<Scored> {
-    let best = |range: std::ops::Range<usize>| {
+    let best = |of: &mut dyn Iterator<Item = Scored>| {
         let (mut by_score, mut by_seen) = (Vec::new(), Vec::new());
-        for scored in range.filter_map(score) {
+        for scored in of {
             keep_better(&mut by_score, &scored, same, |s| s.score);
             keep_better(&mut by_seen, &scored, same, |s| s.seen);
         }
         by_score.extend(by_seen);
         by_score
     };
-    std::thread::scope(|scope| {
-        let other = scope.spawn(|| best(count / 2..count));
-        let mut all = best(0..count / 2);
-        all.extend(other.join().expect("no panic in scoring"));
-        all
-    })
+    // Those of either half stay: where the best one is not borne out another may be.
+    let half = |range: std::ops::Range<usize>| {
+        let parts = range.clone().step_by(PART).map(|from| from..(from + PART).min(range.end));
+        let of_parts = parallel::map(parts, |part| best(&mut part.filter_map(score)));
+        best(&mut of_parts.into_iter().flatten())
+    };
+    [half(0..count / 2), half(count / 2..count)].concat()
 }
 
 /// Takes a candidate in place of the one that says the same, if it is better.

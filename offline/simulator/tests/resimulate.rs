@@ -12,6 +12,7 @@ use recordings::csv;
 use simulator::RobotModel;
 use simulator::any_arm::{ArmSimulation, trajectory};
 use simulator::model::{Bound, Connection, ControllerModel, ControllerNumbers, Effect};
+use simulator::physics::Channel;
 use simulator::plant::{Given, Vector};
 use simulator::resimulate::{ClosedLoop, Motion, OpenLoop, Run, Simulated, closed_loop, inverse, open_loop};
 
@@ -98,8 +99,8 @@ fn commands_of_another_simulator_give_nearly_its_motion() {
 }
 
 /// Rows from `first` on.
-fn tail(found: &Simulated, first: usize) -> (Vec<f64>, Vec<Vector>, Vec<Vector>) {
-    (found.time_s[first..].to_vec(), found.motors[first..].to_vec(), found.torque[first..].to_vec())
+fn tail(found: &Simulated, first: usize) -> (Vec<f64>, [Vec<Vector>; 3]) {
+    (found.time_s[first..].to_vec(), [&found.motors, &found.torque, &found.true_joints].map(|rows| rows[first..].to_vec()))
 }
 
 #[test]
@@ -111,8 +112,25 @@ fn rows_that_are_not_kept_are_simulated_all_the_same() {
     let first = recorded.time_s.iter().position(|time_s| time_s - recorded.time_s[0] >= from_s).expect("longer");
     let in_loop =
         |from_s: f64| closed_loop(&robot, &recorded, ClosedLoop { from_s, ..ClosedLoop::default() }).expect("closed loop");
-    let driven = |from_s: f64| open_loop(&robot, &recorded, OpenLoop { from_s, ..OpenLoop::default() }).expect("open loop");
-    for (whole, part) in [(in_loop(0.0), in_loop(from_s)), (driven(0.0), driven(from_s))] {
+    // What remembers nothing begins with the window of the first row that is kept, what does with the first of all.
+    let forever = f64::NEG_INFINITY;
+    let hysteresis = with(&robot, "cable_hysteresis", &[("a", 0.5), ("k", 1000.0), ("z_m", 2e-3)], Bound::Joint(1), forever);
+    let late = with(&robot, "measurement_delay", &[("d", 0.03)], Bound::Channel(Channel::Transmission), forever);
+    let from_motion = with(&robot, "payload", &[("m_p", 0.25)], Bound::Robot, 6.5);
+    let driven = |robot: &RobotModel, window_s: f64, from_s: f64| {
+        open_loop(robot, &recorded, OpenLoop { window_s, from_s, ..OpenLoop::default() }).expect("open loop")
+    };
+    let both = |robot: &RobotModel, window_s: f64| (driven(robot, window_s, 0.0), driven(robot, window_s, from_s));
+    let all = [
+        (in_loop(0.0), in_loop(from_s)),
+        both(&robot, 1.0),
+        both(&robot, 0.013),
+        both(&robot, f64::INFINITY),
+        both(&hysteresis, 1.0),
+        both(&late, 0.3),
+        both(&from_motion, 1.0),
+    ];
+    for (whole, part) in all {
         assert_eq!((whole.len(), part.len()), (recorded.len(), recorded.len() - first));
         assert_eq!(tail(&whole, first), tail(&part, 0));
     }

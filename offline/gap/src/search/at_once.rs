@@ -3,6 +3,7 @@
 use super::{Scored, Search, simpler_is_enough};
 use crate::hypothesis::{Candidate, Column, Window};
 use crate::intervals::slopes_of;
+use crate::parallel;
 use crate::refine::edges_moved;
 use crate::score::{Fit, Grams};
 
@@ -110,11 +111,11 @@ impl Search<'_, '_> {
 
     fn refined_starts(&self, grams: &Grams, base: &Fit, worth: &dyn Fn(&Candidate) -> bool, window: Option<Window>) -> Vec<Scored> {
         let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
-        let mut starts: Vec<Scored> = candidates
-            .map(|c| window.map_or_else(|| c.clone(), |window| c.within(self.problem, window)))
-            .filter(Candidate::shows)
-            .filter_map(|candidate| self.score(grams, base, &candidate))
-            .collect();
+        let scored = parallel::map(candidates.collect::<Vec<_>>(), |c| {
+            let candidate = window.map_or_else(|| c.clone(), |window| c.within(self.problem, window));
+            if candidate.shows() { self.score(grams, base, &candidate) } else { None }
+        });
+        let mut starts: Vec<Scored> = scored.into_iter().flatten().collect();
         starts.sort_by(|a, b| b.seen.total_cmp(&a.seen));
         let mut kept: Vec<Scored> = Vec::new();
         for start in starts {
@@ -122,14 +123,7 @@ impl Search<'_, '_> {
                 kept.push(start);
             }
         }
-        let refine = |part: &mut [Scored]| part.iter_mut().for_each(|scored| self.settle_shape(grams, base, scored));
-        let half = kept.len() / 2;
-        let (left, right) = kept.split_at_mut(half);
-        std::thread::scope(|scope| {
-            let other = scope.spawn(|| refine(right));
-            refine(left);
-            other.join().expect("no panic in refining");
-        });
+        let _ = parallel::map(&mut kept, |scored| self.settle_shape(grams, base, scored));
         // With the stiffness of the simulation it is the same claim with a number less.
         kept.iter().filter(|scored| !simpler_is_enough(scored, &kept)).cloned().collect()
     }

@@ -145,6 +145,11 @@ impl Sensors {
         })
     }
 
+    /// Does what they show depend on what they saw before?
+    pub(crate) fn remember(&self) -> bool {
+        self.motor_delay.is_some() || self.joint_delay.is_some() || self.tip_delay.is_some()
+    }
+
     /// Looks at a state; to be called once per period.
     pub(crate) fn see(&mut self, state: &State, time_s: f64) -> Seen {
         let mut motors: Vector = std::array::from_fn(|i| state.motors[i] - self.zero[i]);

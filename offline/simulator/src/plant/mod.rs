@@ -209,6 +209,11 @@ impl Plant {
         &self.drives[joint].nominal
     }
 
+    /// Does it remember anything but positions and speeds?
+    pub(crate) fn remembers(&self) -> bool {
+        self.memories > 0
+    }
+
     /// A place for a memory.
     pub(crate) fn memory(&mut self) -> Result<usize, PlantError> {
         if self.memories == MEMORIES_MAX {

@@ -49,7 +49,10 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
     let mut next_start_s = f64::NEG_INFINITY;
     let kept_from = run.row_from(options.from_s);
     let mut out = Simulated::new(model.joint_count(), run.len() - kept_from);
-    for row in 0..run.len() {
+    // Where nothing is remembered, windows that are not kept say nothing of those that are.
+    let remembers = plant.remembers() || sensors.remember();
+    let first = if remembers { 0 } else { last_start(run, options.window_s, kept_from) };
+    for row in first..run.len() {
         let time_s = run.time_s[row] - run.time_s[0];
         if timed {
             plant.at(time_s);
@@ -71,6 +74,18 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
         }
     }
     Ok(out)
+}
+
+/// The row at which the window begins that a row lies in.
+fn last_start(run: &Run, window_s: f64, row: usize) -> usize {
+    let mut start = 0;
+    loop {
+        let next = run.row_from(run.time_s[start] - run.time_s[0] + window_s - 1e-9);
+        if next > row || next <= start {
+            return start;
+        }
+        start = next;
+    }
 }
 
 /// Shaft to capstan, per joint.

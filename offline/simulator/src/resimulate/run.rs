@@ -8,6 +8,9 @@ use crate::any_arm::Sensors;
 use crate::model::{Connection, RobotModel};
 use crate::plant::{JOINTS_MAX, Vector, inverse};
 
+/// Rows on either side of which speeds that were not recorded are differences: one of encoder steps over a millisecond is mostly noise.
+const REACH: usize = 5;
+
 /// One number per joint and row; joints beyond the robot's are 0.
 type Rows = Vec<Vector>;
 
@@ -111,10 +114,17 @@ impl Run {
         }
     }
 
+    /// Leaves, beside time and commands, what a simulation along the commands begins with: all of a run takes much memory.
+    pub fn keep_commands(&mut self) {
+        let others = [&mut self.motors, &mut self.speeds, &mut self.torque, &mut self.joints, &mut self.true_joints];
+        for rows in others.into_iter().flatten() {
+            rows.truncate(1 + REACH);
+            rows.shrink_to_fit();
+        }
+    }
+
     /// Motors and their speeds at a row; speeds that were not recorded are differences over some rows.
     pub(super) fn state_at(&self, row: usize) -> Option<(Vector, Vector)> {
-        /// Rows on either side: a difference of encoder steps over a millisecond is mostly noise.
-        const REACH: usize = 5;
         let motors = self.motors.as_ref()?;
         let speeds = if let Some(speeds) = &self.speeds {
             speeds[row]
