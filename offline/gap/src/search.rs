@@ -465,6 +465,10 @@ impl Search<'_, '_> {
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         let mut claims = distinct(&claims);
+        // One that was found in the window only may turn round otherwise than what stood first before.
+        self.round_alike(grams, &base, &mut claims);
+        claims.retain(|s| !rest(s));
+        sort(&mut claims);
         // Rivals are told apart by the rows that count once the best of them is in: what it leaves is its model's error, and
         // that is not independent from row to row.
         if let Some(best) = claims.first().filter(|best| best.gain.nats > 0.0) {

@@ -505,3 +505,20 @@ fn a_robot_agrees_with_its_own_simulation() {
         .collect();
     assert!(tip.len() == 3 && tip.iter().all(|metres| *metres < 5e-5), "{tip:?}");
 }
+
+#[test]
+fn friction_that_comes_on_the_way_turns_round_as_its_rivals_do() {
+    // Two of a set that was sealed. In the window only friction by load, or plain friction, had turned round by the better law: it was named with 0.99.
+    for (physics, parameter, severity, label) in
+        [("coulomb_friction", "f_c", 3.0, "full/single/34"), ("stribeck_friction", "f_s", 10.0, "full/strong/169")]
+    {
+        let folder = Folder::new(&format!("turns-{physics}"));
+        let effect = Wanted { onset: true, severity: Some(severity), ..wanted(physics, None, &[]) };
+        let order = Order { seed: 3_881_812_845, label: label.to_owned(), effects: vec![effect], ..Order::default() };
+        let (case, truth) = written(&folder, &order);
+        let report = case.judged(&folder.file("out"));
+        assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+        let told = named(&report, physics, truth[0].joint_name.as_ref().expect("a joint"));
+        near(told, parameter, truth[0].effect.parameters[parameter], 0.05);
+    }
+}
