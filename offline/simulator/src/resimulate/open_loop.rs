@@ -1,5 +1,7 @@
 //! The recorded torque drives the plant.
 
+use std::ops::Range;
+
 use super::hold::Held;
 use super::{Hold, ResimulateError, Run, Simulated};
 use crate::any_arm::{Sensors, is_timed};
@@ -46,46 +48,42 @@ pub fn open_loop(model: &RobotModel, run: &Run, options: OpenLoop) -> Result<Sim
     let held = Held::new(run, torque, options.hold, parts);
     let timed = is_timed(model);
     let mut state = State::ZERO;
-    let mut next_start_s = f64::NEG_INFINITY;
     let kept_from = run.row_from(options.from_s);
     let mut out = Simulated::new(model.joint_count(), run.len() - kept_from);
     // Where nothing is remembered, windows that are not kept say nothing of those that are.
     let remembers = plant.remembers() || sensors.remember();
-    let first = if remembers { 0 } else { last_start(run, options.window_s, kept_from) };
-    for row in first..run.len() {
-        let time_s = run.time_s[row] - run.time_s[0];
-        if timed {
-            plant.at(time_s);
-        }
-        if time_s >= next_start_s - 1e-9 {
-            state = start(&mut plant, &sensors, run, row, &state);
-            next_start_s = time_s + options.window_s;
-        }
-        let seen = sensors.see(&state, time_s);
-        if row >= kept_from {
-            out.push(run.time_s[row], &seen, &torque[row]);
-        }
-        let Some(next_s) = run.time_s.get(row + 1) else { break };
-        let part_s = (next_s - run.time_s[row]) / held.parts() as f64;
-        for part in 0..held.parts() {
-            let mut applied = held.at(row, part);
-            applied.iter_mut().zip(&gears).for_each(|(torque, gear)| *torque *= gear);
-            plant.advance(&mut state, &applied, part_s);
+    for window in windows(run, options.window_s).filter(|window| remembers || window.end > kept_from) {
+        for row in window.clone() {
+            let time_s = run.time_s[row] - run.time_s[0];
+            if timed {
+                plant.at(time_s);
+            }
+            if row == window.start {
+                state = start(&mut plant, &sensors, run, row, &state);
+            }
+            let seen = sensors.see(&state, time_s);
+            if row >= kept_from {
+                out.push(run.time_s[row], &seen, &torque[row]);
+            }
+            let Some(next_s) = run.time_s.get(row + 1) else { break };
+            let part_s = (next_s - run.time_s[row]) / held.parts() as f64;
+            for part in 0..held.parts() {
+                let mut applied = held.at(row, part);
+                applied.iter_mut().zip(&gears).for_each(|(torque, gear)| *torque *= gear);
+                plant.advance(&mut state, &applied, part_s);
+            }
         }
     }
     Ok(out)
 }
 
-/// The row at which the window begins that a row lies in.
-fn last_start(run: &Run, window_s: f64, row: usize) -> usize {
-    let mut start = 0;
-    loop {
-        let next = run.row_from(run.time_s[start] - run.time_s[0] + window_s - 1e-9);
-        if next > row || next <= start {
-            return start;
-        }
-        start = next;
-    }
+/// Rows of the windows, each of which begins with the first row so long after the one before began.
+fn windows(run: &Run, window_s: f64) -> impl Iterator<Item = Range<usize>> {
+    let from = move |start: usize| {
+        let begun_s = run.time_s.get(start)? - run.time_s[0];
+        Some(start..run.row_from(begun_s + window_s - 1e-9).max(start + 1))
+    };
+    std::iter::successors(from(0), move |window| from(window.end))
 }
 
 /// Shaft to capstan, per joint.
