@@ -239,7 +239,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }
         ("link_geometry", form) => {
             let link = joint.ok_or("it has no link")?;
-            if let Some(axis) = form.strip_prefix("moved along ") {
+            if let Some(axis) = family.side().strip_prefix("moved along ") {
                 let sign =
                     along_its_length(found, link, axis).ok_or("a link moved across its length is not a term of the simulator")?;
                 parameters = Parameters::of(&[("d_length", sign * estimate.coefficients[0])]);

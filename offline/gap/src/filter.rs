@@ -12,6 +12,7 @@ const ROWS: usize = 4;
 /// A window of odd length with its derivatives.
 #[derive(Debug, Clone)]
 pub struct Window {
+    sigma_s: f64,
     half: usize,
     weights: [Vec<f64>; 3],
 }
@@ -31,12 +32,21 @@ impl Window {
         // Orthogonal to constants, 1 for t²/2.
         let gain = 0.5 * (fourth - second * second) * dt_s * dt_s;
         let curve = offsets.iter().zip(&smooth).map(|(x, w)| w * (x * x - second) / gain).collect();
-        Self { half, weights: [smooth, first, curve] }
+        Self { sigma_s, half, weights: [smooth, first, curve] }
     }
 
     /// No smoothing, no derivatives: for points without a clock.
     pub fn identity() -> Self {
-        Self { half: 0, weights: [vec![1.0], vec![0.0], vec![0.0]] }
+        Self { sigma_s: 0.0, half: 0, weights: [vec![1.0], vec![0.0], vec![0.0]] }
+    }
+
+    /// What a step from 0 to 1 is at a time after it, s, to a hundredth: the logistic curve stands for the Gaussian's integral.
+    pub fn of_a_step(&self, after_s: f64) -> f64 {
+        if after_s.abs() < REACH * self.sigma_s {
+            1.0 / (1.0 + (-1.702 * after_s / self.sigma_s).exp())
+        } else {
+            f64::from(u8::from(after_s >= 0.0))
+        }
     }
 
     /// Samples at each end of a series whose result leans on samples that do not exist.
@@ -135,6 +145,18 @@ mod tests {
         let window = Window::new(0.012, 0.001);
         assert!(window.apply(&[7.0; 300], 0).iter().all(|x| (x - 7.0).abs() < 1e-12));
         assert!(window.apply(&[7.0; 300], 1).iter().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_step_is_what_the_window_makes_of_one() {
+        let window = Window::new(0.012, 0.001);
+        let raw: Vec<f64> = (0..200).map(|i| f64::from(u8::from(i >= 100))).collect();
+        for (i, smoothed) in window.apply(&raw, 0).into_iter().enumerate() {
+            // The step lies between two samples.
+            let told = window.of_a_step((i as f64 - 99.5) * 0.001);
+            assert!((told - smoothed).abs() < 0.012, "{i}: {told} {smoothed}");
+        }
+        assert_eq!([-1e-9, 0.0].map(|after| Window::identity().of_a_step(after)), [0.0, 1.0]);
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! What effects leave of what was held out, where nothing was fitted; and which of them do not hold there. What was fitted says how well a
-//! claim fits, and its blocks how well it predicts their neighbours: a wrong one, bent to what is there, may do both.
+//! claim fits, and its blocks how well it predicts their neighbours: a wrong one, bent to what is there, may do both. Nor does hold what is
+//! said beside a larger effect and may by its own interval be nothing.
 
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
 use crate::intervals::Estimate;
 use crate::nominal::{less_means, mean};
 use crate::problem::Problem;
-use crate::search::{Answer, Effect, Thresholds};
+use crate::search::{Answer, Effect, Scored, Thresholds};
 use crate::verdicts::{left, main_cell};
 
 /// Of the squared size of an effect, what it has to leave less of what was held out at least: 1 where it is as it was fitted, -1 where it has
@@ -79,9 +80,15 @@ impl HeldOut<'_> {
         // Each step takes an effect back, or a rival that holds there; a rival that no longer does is not exchanged again.
         loop {
             let all = sized(&answer.effects, estimates);
-            let fails = |k: &usize| !self.holds(answer, &all, *k, thresholds);
+            // Points have offset, play and coupling on every joint.
+            let needless = |k: usize| !self.problem.of_points() && is_needless(answer, estimates, k);
+            let fails = |k: &usize| needless(*k) || !self.holds(answer, &all, *k, thresholds);
             let Some(k) = (0..all.len()).rev().find(fails) else { return refused };
-            let rival = if answer.effects[k].second { None } else { self.rival(answer, &all, k, thresholds) };
+            let rival = match (answer.effects[k].second, needless(k)) {
+                (true, _) => None,
+                (false, true) => plainer(&answer.effects[k]),
+                (false, false) => self.rival(answer, &all, k, thresholds),
+            };
             if let Some(rival) = rival {
                 answer.exchange(k, rival);
             } else {
@@ -177,6 +184,30 @@ impl HeldOut<'_> {
         }
         Some((c, before, after))
     }
+}
+
+/// Is an effect said beside a larger one of its joint or of the whole robot, or in place of a plainer one, though it may be nothing by its own interval?
+fn is_needless(answer: &Answer, estimates: &[Estimate], k: usize) -> bool {
+    let effect = &answer.effects[k];
+    let place = |effect: &Effect| effect.chosen.candidate.family.joints.first().copied();
+    let of_one_place = |other: &Effect| place(other).is_none() || place(effect).is_none() || place(other) == place(effect);
+    let beside_larger = answer.effects.iter().any(|other| other.gain.nats > effect.gain.nats && of_one_place(other));
+    effect.is_named()
+        && (beside_larger || plainer(effect).is_some())
+        && estimates[k].may_be_nothing(effect.chosen.candidate.family.physics)
+}
+
+/// The rival that an effect is where its own number is nothing: friction by load and a level is the level.
+fn plainer(effect: &Effect) -> Option<usize> {
+    let own = &effect.chosen.candidate;
+    if own.family.physics != "load_dependent_friction" || own.columns.len() < 2 {
+        return None;
+    }
+    let is_its_level = |rival: &Scored| {
+        let family = &rival.candidate.family;
+        family.physics == "coulomb_friction" && family.joints == own.family.joints && rival.score >= NEAR * effect.chosen.score
+    };
+    effect.rivals.iter().position(is_its_level)
 }
 
 /// Is an effect the only one, and accepted barely or bent in many numbers?

@@ -27,6 +27,20 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Do the intervals of what says how large an effect is all hold that it is not there?
+    pub(crate) fn may_be_nothing(&self, physics: &str) -> bool {
+        let sizes = sizes(physics);
+        let mut own = sizes.iter().flat_map(|(name, none)| {
+            self.parameters.iter().filter(move |(named, _)| named.name == *name).map(move |(_, interval)| (*none, interval))
+        });
+        let mut some = false;
+        own.all(|(none, [least, most])| {
+            some = true;
+            // What is not asked, a number that the form has not, says nothing.
+            least < most && *least <= none && none <= *most
+        }) && some
+    }
+
     /// Intervals that hold another estimate's as well, of the numbers that both have.
     fn widen(&mut self, other: &Self) {
         let hold = |own: &mut [f64; 2], other: &[f64; 2]| *own = [own[0].min(other[0]), own[1].max(other[1])];
@@ -67,6 +81,31 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("measurement_delay" | "link_geometry", _) => 0.05,
         ("motor_torque_scale", _) => 0.025,
         _ => 0.015,
+    }
+}
+
+/// The numbers that say how large an effect is, with what they are where there is none. None of what warms up, whose size and time constant
+/// make up for one another, nor of a soft cable, which is none where it is infinitely stiff.
+fn sizes(physics: &str) -> &'static [(&'static str, f64)] {
+    match physics {
+        "coulomb_friction" => &[("f_c", 0.0)],
+        "viscous_friction" | "backlash" => &[("b", 0.0)],
+        "load_dependent_friction" => &[("mu_l", 0.0)],
+        "cable_hysteresis" => &[("a", 1.0)],
+        "cable_creep" => &[("J_k", 0.0)],
+        "joint_coupling" => &[("c_ij", 0.0)],
+        "payload" => &[("m_p", 0.0)],
+        "gravity_direction" => &[("a", 0.0), ("b", 0.0)],
+        "link_inertia" => &[("dpi_B", 0.0)],
+        "motor_torque_scale" => &[("kappa", 1.0)],
+        "torque_ripple" => &[("amp", 0.0)],
+        "joint_offset" => &[("o", 0.0)],
+        "transmission_ratio" => &[("e", 0.0)],
+        "pulley_eccentricity" => &[("e_over_r", 0.0)],
+        "link_geometry" => &[("d_alpha", 0.0), ("d_length", 0.0)],
+        "measurement_delay" => &[("d", 0.0), ("clock_drift", 0.0)],
+        "frame_misalignment" => &[("w_x", 0.0), ("w_y", 0.0), ("w_z", 0.0), ("t_x", 0.0), ("t_y", 0.0), ("t_z", 0.0)],
+        _ => &[],
     }
 }
 

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, TOOL_TWIST};
+use crate::hypothesis::{Candidate, DRIFTS, EXPONENTS, GROUND, OWN_STIFFNESS, TOOL_TWIST, TWISTED};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -31,7 +31,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("f_c", effort, theta[0]),
             named("f_s", effort, theta[0] + theta[1]),
             named("v_s", unit("rad/s", "m/s"), shaped("v_s")),
-            named("a", "1", shaped("a")),
+            named("a", "1", shaped("a").clamp(EXPONENTS[0], EXPONENTS[1])),
         ],
         ("load_dependent_friction", _) => {
             let mut all = vec![named("mu_l", "1", theta[0]), named("mu_theta", "1", theta[0].max(0.0).ln_1p())];
@@ -121,7 +121,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("phi", "rad", theta[1].atan2(theta[0])),
             named("period", position, shaped("period")),
         ],
-        ("link_geometry", "twist before the joint" | TOOL_TWIST) => vec![named("d_alpha", "rad", theta[0])],
+        ("link_geometry", form) if TWISTED.contains(&form) || form == TOOL_TWIST => vec![named("d_alpha", "rad", theta[0])],
         ("link_geometry", _) => vec![named("d_length", "m", theta[0])],
         // Joint encoders that come early against the motors' are motors that come late: nothing is measured ahead of time.
         ("measurement_delay", "joint encoders") => vec![named("d", "s", theta[0].abs())],

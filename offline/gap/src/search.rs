@@ -13,6 +13,7 @@ use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::{Channel, Problem};
 use crate::refine::{refined, starts};
+use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
 
 /// What decides.
@@ -456,8 +457,14 @@ impl Search<'_, '_> {
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
-        // And of one joint's dry friction there is one level.
-        let rest = |s: &Scored| others.iter().any(|other| other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate));
+        // And of one joint's dry friction there is one level, and what shakes a drive shakes its cable.
+        let robot = self.problem.robot;
+        let rest = |s: &Scored| {
+            let of = |other: &Candidate| {
+                other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate) || turns_alike(other, &s.candidate, robot)
+            };
+            others.iter().any(of)
+        };
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
@@ -642,6 +649,24 @@ fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
         _ => false,
     };
     one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
+}
+
+/// Difference of two periods that are one, of either.
+const ALIKE: f64 = 0.03;
+
+/// Is one a motor that ripples and the other a pulley of its joint that is out of true as often?
+fn turns_alike(one: &Candidate, other: &Candidate, robot: &Robot) -> bool {
+    let period = |candidate: &Candidate| match candidate.family.physics {
+        "torque_ripple" => {
+            let joint = candidate.family.joints[0];
+            let turn = 2.0 * std::f64::consts::PI / robot.motor_from_joint[(joint, joint)].abs();
+            candidate.shape_of("order").map(|order| turn / order)
+        }
+        "pulley_eccentricity" => candidate.shape_of("period"),
+        _ => None,
+    };
+    let (Some(own), Some(theirs)) = (period(one), period(other)) else { return false };
+    one.family.physics != other.family.physics && one.family.joints == other.family.joints && (own - theirs).abs() < ALIKE * theirs
 }
 
 /// May a form be there in a part of a run only?

@@ -2,9 +2,10 @@
 
 use std::sync::OnceLock;
 
-use arm::serial::{PARAMETERS, Workspace};
+use arm::serial::{PARAMETERS, SerialArm, Workspace};
 use nalgebra::DMatrix;
 
+use crate::motion::{Motion, State};
 use crate::nominal::Evaluator;
 use crate::problem::{Channel, Problem};
 
@@ -35,6 +36,25 @@ impl Column {
         }
     }
 
+    /// Adds to a part, or a part; a cell that is not there takes nothing.
+    pub fn add(&mut self, cell: Option<usize>, values: &[f64]) {
+        let mut more = Self::default();
+        more.push(cell, values);
+        *self = std::mem::take(self).and(more);
+    }
+
+    /// With the parts of another one.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        for (cell, values) in other.parts {
+            match self.parts.binary_search_by_key(&cell, |(own, _)| *own) {
+                Ok(at) => self.parts[at].1.iter_mut().zip(values).for_each(|(own, more)| *own += more),
+                Err(at) => self.parts.insert(at, (cell, values)),
+            }
+        }
+        self
+    }
+
     /// Makes it 0 where a cell says nothing.
     pub fn silence(&mut self, problem: &Problem) {
         for (cell, values) in &mut self.parts {
@@ -42,26 +62,27 @@ impl Column {
         }
     }
 
-    /// The same within a window of each run only, s from its start.
+    /// The same within a window of each run only, s from its start: what begins at once begins in the rows as everything is smoothed in them.
     #[must_use]
     pub fn within(&self, problem: &Problem, [from_s, to_s]: Window) -> Self {
-        self.only(problem, |r, i| {
-            let t = problem.pairs[r].real.run.elapsed_s(i);
-            t >= from_s && t < to_s
+        self.weighted(problem, |r, i| {
+            let motion = &problem.pairs[r].real;
+            let t = motion.run.elapsed_s(i);
+            motion.window.of_a_step(t - from_s) * motion.window.of_a_step(to_s - t)
         })
     }
 
     /// What of it lies in one run.
     #[must_use]
     pub fn of_run(&self, problem: &Problem, run: usize) -> Self {
-        self.only(problem, |r, _| r == run)
+        self.weighted(problem, |r, _| f64::from(u8::from(r == run)))
     }
 
-    /// What of it lies in some rows, of which run and sample are told.
-    fn only(&self, problem: &Problem, there: impl Fn(usize, usize) -> bool) -> Self {
+    /// Each row, of which run and sample are told, by its weight.
+    fn weighted(&self, problem: &Problem, weight: impl Fn(usize, usize) -> f64) -> Self {
         let parts = self.parts.iter().map(|(cell, values)| {
             let rows = &problem.cells[*cell].rows;
-            (*cell, values.iter().zip(rows).map(|(x, &(r, i))| if there(r, i) { *x } else { 0.0 }).collect())
+            (*cell, values.iter().zip(rows).map(|(x, &(r, i))| x * weight(r, i) as f32).collect())
         });
         Self { parts: parts.collect() }
     }
@@ -157,8 +178,42 @@ impl<'a> Dictionary<'a> {
         self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
     }
 
+    /// What the links ask for more, per unit of it, where a joint is elsewhere and moves otherwise than its motor says: by so much position,
+    /// velocity and acceleration at a sample. The position counts where no encoder at the joint tells it.
+    pub fn moved_otherwise(&self, joint: usize, change: impl Fn(&Motion, usize) -> [f64; 3]) -> Column {
+        self.asked_more(1e-3, |motion, i, state, step| {
+            let [position, velocity, acceleration] = change(motion, i).map(|x| step * x);
+            if motion.deflection.is_none() {
+                state.position[joint] += position;
+            }
+            state.velocity[joint] += velocity;
+            state.acceleration[joint] += acceleration;
+        })
+    }
+
+    /// The same in other states than those believed, from a change by one step.
+    pub fn asked_more(&self, step: f64, change: impl Fn(&Motion, usize, &mut State, f64)) -> Column {
+        let mut evaluator = Evaluator::new(self.problem.robot, self.problem.nominal);
+        let mut torques = vec![Vec::with_capacity(self.grid.len()); self.joints()];
+        for (&(r, i, _), believed) in self.grid.iter().zip(&self.links()[0]) {
+            let motion = &self.problem.pairs[r].real;
+            let mut state = motion.link(i);
+            change(motion, i, &mut state, step);
+            let there = evaluator.link(&state);
+            torques
+                .iter_mut()
+                .zip(there.iter().zip(believed))
+                .for_each(|(column, (there, here))| column.push((there - here) / step));
+        }
+        self.effort(&torques.into_iter().map(Some).collect::<Vec<_>>(), false)
+    }
+
     /// What the links alone ask of a joint at the grid, without any friction: in their motion, or to be held where they are.
     pub fn links_alone(&self, joint: usize, held: bool) -> Vec<f64> {
+        self.links()[usize::from(held)].iter().map(|torques| torques[joint]).collect()
+    }
+
+    fn links(&self) -> &[Vec<Vec<f64>>; 2] {
         let of = |held: bool| {
             let mut evaluator = Evaluator::new(self.problem.robot, self.problem.nominal);
             let torques = self.grid.iter().map(|&(r, i, _)| {
@@ -171,7 +226,15 @@ impl<'a> Dictionary<'a> {
             });
             torques.collect::<Vec<_>>()
         };
-        self.links.get_or_init(|| [of(false), of(true)])[usize::from(held)].iter().map(|torques| torques[joint]).collect()
+        self.links.get_or_init(|| [of(false), of(true)])
+    }
+
+    /// What the links of another arm, of the same inertia, would ask of the joints in this motion, row by row.
+    pub fn loads_of(&self, arm: &SerialArm) -> Vec<Vec<f64>> {
+        let mut robot = self.problem.robot.clone();
+        robot.arm = arm.clone();
+        let mut evaluator = Evaluator::new(&robot, self.problem.nominal);
+        self.grid.iter().map(|&(r, i, _)| evaluator.link(&self.problem.pairs[r].real.link(i))).collect()
     }
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.

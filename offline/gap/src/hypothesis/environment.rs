@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use arm::serial::Workspace;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Column, Family, product};
@@ -46,10 +46,12 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
     let tips = Arc::new(tips(dictionary));
     let own = tips.clone();
+    let axes = felt(&tips);
+    let bounds = vec![Bound::Free; axes.len()];
     all.push(
-        Family::fixed("external_contact", &[], "steady force", TORQUE, &[Bound::Free; 3], move |d| {
+        Family::fixed("external_contact", &[], "steady force", TORQUE, &bounds, move |d| {
             let own = own.of(d);
-            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| effort(d, &own, |_| axis)).to_vec()
+            axes.iter().map(|axis| effort(d, &own, |_| *axis)).collect()
         })
         // A force that never lets go is a weight before it is a contact.
         .penalised(10.0),
@@ -119,6 +121,23 @@ fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3
     };
     let torques: Vec<Option<Vec<f64>>> = (0..n).map(|j| Some(torque(j))).collect();
     dictionary.effort(&torques, true)
+}
+
+/// Share of the strongest direction's torque that a direction has to ask of the joints to be felt.
+const FELT: f64 = 0.02;
+
+/// Directions of a force that the joints feel: x, y and z, or, of an arm with fewer joints, those at right angles that are not borne by its bearings.
+fn felt(tips: &Tips) -> Vec<Vector3<f64>> {
+    let mut gram = Matrix3::zeros();
+    for jacobian in &tips.jacobians {
+        let n = jacobian.len() / 3;
+        gram += Matrix3::from_fn(|a, b| (0..n).map(|j| jacobian[a * n + j] * jacobian[b * n + j]).sum());
+    }
+    let eigen = gram.symmetric_eigen();
+    let least = FELT * FELT * eigen.eigenvalues.max();
+    let all: Vec<Vector3<f64>> =
+        (0..3).filter(|k| eigen.eigenvalues[*k] > least).map(|k| eigen.eigenvectors.column(k).into()).collect();
+    if all.len() == 3 { vec![Vector3::x(), Vector3::y(), Vector3::z()] } else { all }
 }
 
 /// Directions in which walls are looked for: the six axes and the twelve between two of them.

@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Family};
-use crate::nominal::Evaluator;
 use crate::problem::Channel;
 
 /// The form of a payload whose place is supposed, not asked of the data.
@@ -181,11 +180,9 @@ fn push_gravity(all: &mut Vec<Family>) {
 
 /// Load of the links at each grid row with gravity turned.
 fn turned_load(dictionary: &Dictionary, a: f64, b: f64) -> Vec<Vec<f64>> {
-    let problem = dictionary.problem;
-    let mut robot = problem.robot.clone();
-    robot.arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * problem.robot.arm.gravity_vector());
-    let mut turned = Evaluator::new(&robot, problem.nominal);
-    dictionary.grid.iter().map(|&(r, i, _)| turned.link(&problem.pairs[r].real.link(i))).collect()
+    let mut arm = dictionary.problem.robot.arm.clone();
+    arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * arm.gravity_vector());
+    dictionary.loads_of(&arm)
 }
 
 /// Joint torques per unit between two loads.

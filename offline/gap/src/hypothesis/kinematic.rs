@@ -8,6 +8,13 @@ use super::{Bound, Column, Family};
 use crate::problem::Channel;
 
 const TIP: Channel = Channel::EndEffector;
+/// Forms of a link that is turned, or moved, by itself or with the torque that its weight then asks for.
+pub(crate) const TWISTED: [&str; 2] = ["twist before the joint", "twist before the joint, torque too"];
+const MOVED: [[&str; 2]; 3] = [
+    ["moved along x", "moved along x, torque too"],
+    ["moved along y", "moved along y, torque too"],
+    ["moved along z", "moved along z, torque too"],
+];
 /// The form of a tool that is turned about the last link's x.
 pub(crate) const TOOL_TWIST: &str = "twist of the tool";
 /// The form of a tool that is longer.
@@ -21,20 +28,27 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let small = Bound::Between(-0.2, 0.2);
+    // A link that is otherwise than believed carries its weight elsewhere; a kinematic model that is wrong for the camera alone does not.
+    let told: &[bool] = if dictionary.problem.has(Channel::JointTorque) { &[false, true] } else { &[false] };
     for link in 0..dictionary.joints() {
-        all.push(Family::fixed("link_geometry", &[link], "twist before the joint", TIP, &[small], move |d| {
-            let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
-            vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| turn * placement), TURN)]
-        }));
-        for (axis, form) in axes.into_iter().zip(["moved along x", "moved along y", "moved along z"]) {
-            all.push(
-                Family::fixed("link_geometry", &[link], form, TIP, &[small], move |d| {
-                    const STEP: f64 = 1e-5;
-                    let step = Translation3::from(axis * STEP);
-                    vec![derivative(d, &with_placement(&d.problem.robot.arm, link, |placement| step * placement), STEP)]
-                })
-                .penalised(2.0),
-            );
+        for &carries in told {
+            // The base may stand anywhere.
+            let moves = link > 0 || !carries;
+            let form = TWISTED[usize::from(carries)];
+            all.push(Family::fixed("link_geometry", &[link], form, TIP, &[small], move |d| {
+                let turn = Rotation3::from_scaled_axis(Vector3::x() * TURN);
+                vec![changed(d, &with_placement(&d.problem.robot.arm, link, |placement| turn * placement), TURN, carries)]
+            }));
+            for (axis, forms) in axes.into_iter().zip(MOVED).filter(|_| moves) {
+                all.push(
+                    Family::fixed("link_geometry", &[link], forms[usize::from(carries)], TIP, &[small], move |d| {
+                        const STEP: f64 = 1e-5;
+                        let step = Translation3::from(axis * STEP);
+                        vec![changed(d, &with_placement(&d.problem.robot.arm, link, |placement| step * placement), STEP, carries)]
+                    })
+                    .penalised(2.0),
+                );
+            }
         }
     }
     let last = dictionary.joints() - 1;
@@ -103,6 +117,23 @@ fn tips(dictionary: &Dictionary, arm: &SerialArm) -> Vec<Vector3<f64>> {
 fn derivative(dictionary: &Dictionary, arm: &SerialArm, step: f64) -> Column {
     let (here, there) = (tips(dictionary, &dictionary.problem.robot.arm), tips(dictionary, arm));
     dictionary.tip(|_, _, row| ((there[row] - here[row]) / step).into())
+}
+
+/// The same, and what the joints need more than they are believed to.
+fn changed(dictionary: &Dictionary, arm: &SerialArm, step: f64, carries: bool) -> Column {
+    let moved = derivative(dictionary, arm, step);
+    if !carries {
+        return moved;
+    }
+    let loads = dictionary.loads_of(arm);
+    let more = |j: usize| {
+        let believed = dictionary.links_alone(j, false);
+        Some(loads.iter().zip(believed).map(|(load, believed)| (load[j] - believed) / step).collect())
+    };
+    let mut torque = dictionary.effort(&(0..dictionary.joints()).map(more).collect::<Vec<_>>(), true);
+    // What the cables give way by moves the tip by far less.
+    torque.parts.retain(|(cell, _)| dictionary.problem.cells[*cell].channel != TIP);
+    moved.and(torque)
 }
 
 fn with_placement(arm: &SerialArm, link: usize, change: impl Fn(IsometryMatrix3<f64>) -> IsometryMatrix3<f64>) -> SerialArm {

@@ -3,7 +3,7 @@
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, heat};
 use super::{Bound, Column, Family, hysteresis, product};
-use crate::nominal::Evaluator;
+use crate::motion::Motion;
 use crate::problem::Channel;
 use crate::run::Run;
 
@@ -321,27 +321,9 @@ fn offset(dictionary: &Dictionary, j: usize) -> Column {
 
 /// The sensor at a joint tells 1 more than there is: what it is compared with, the tip and the load that go with it are elsewhere.
 fn sensor_off(dictionary: &Dictionary, j: usize) -> Column {
-    const STEP: f64 = 1e-3;
-    let problem = dictionary.problem;
-    let mut evaluator = Evaluator::new(problem.robot, problem.nominal);
-    let mut torques = vec![Vec::with_capacity(dictionary.grid.len()); dictionary.joints()];
-    for &(r, i, _) in &dictionary.grid {
-        let mut state = problem.pairs[r].real.link(i);
-        let told = evaluator.link(&state);
-        state.position[j] -= STEP;
-        let there = evaluator.link(&state);
-        torques.iter_mut().zip(there.iter().zip(told)).for_each(|(column, (there, told))| column.push((there - told) / STEP));
-    }
-    let torques: Vec<Option<Vec<f64>>> = torques.into_iter().map(Some).collect();
-    let mut column = offset(dictionary, j);
-    for part in [
-        dictionary.effort(&torques, false),
-        dictionary.tip(|_, _, row| [0, 1, 2].map(|axis| -dictionary.tip_jacobian[row][axis * dictionary.joints() + j])),
-    ] {
-        column.parts.extend(part.parts);
-    }
-    column.parts.sort_by_key(|(cell, _)| *cell);
-    column
+    let torque = dictionary.asked_more(1e-3, |_, _, state, step| state.position[j] -= step);
+    let tip = dictionary.tip(|_, _, row| [0, 1, 2].map(|axis| -dictionary.tip_jacobian[row][axis * dictionary.joints() + j]));
+    offset(dictionary, j).and(torque).and(tip)
 }
 
 /// How far from zero a joint may have been homed, rad or m: what would be 0 further away is no error that grows with the way, but an offset.
@@ -352,6 +334,13 @@ fn homed_within(dictionary: &Dictionary, j: usize) -> f64 {
 
 fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
+    // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever. The link moves faster than the motor says.
+    let with_torque = move |d: &Dictionary| {
+        let faster = |motion: &Motion, i: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| set[j][i]);
+        let mut column = ratio(d).and(d.moved_otherwise(j, faster));
+        column.add(d.problem.cell(Channel::JointTorque, j), &d.load(j));
+        column
+    };
     let (small, free, homed) = (Bound::Between(-0.5, 0.5), Bound::Free, Bound::Within(homed_within(dictionary, j)));
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
     if dictionary.problem.tip_from_truth {
@@ -363,13 +352,8 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         Family::fixed("transmission_ratio", &[j], "about zero", TRANSMISSION, &[small], move |d| vec![ratio(d)]).penalised(0.5),
     );
     all.push(
-        Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| {
-            // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever.
-            let mut column = ratio(d);
-            column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
-            vec![column]
-        })
-        .penalised(0.5),
+        Family::fixed("transmission_ratio", &[j], "about zero, torque too", TRANSMISSION, &[small], move |d| vec![with_torque(d)])
+            .penalised(0.5),
     );
     all.push(
         Family::fixed("transmission_ratio", &[j], "about where it was homed", TRANSMISSION, &[small, homed], move |d| {
@@ -384,11 +368,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             "about where it was homed, torque too",
             TRANSMISSION,
             &[small, homed],
-            move |d| {
-                let mut column = ratio(d);
-                column.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
-                vec![column, offset(d, j)]
-            },
+            move |d| vec![with_torque(d), offset(d, j)],
         )
         .penalised(1.5),
     );
@@ -461,9 +441,14 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         }
         all.push(
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
-                // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one.
-                let mut column = coupled(d);
-                column.push(d.problem.cell(Channel::JointTorque, i), &minus(&d.cable_load(j)));
+                // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one and of its cable.
+                let less = minus(&d.cable_load(j));
+                let moves = d.moved_otherwise(j, |motion, k| {
+                    [&motion.position, &motion.velocity, &motion.acceleration].map(|set| -set[i][k])
+                });
+                let mut column =
+                    coupled(d).and(moves).and(d.strain_of(i, times(&less, &vec![d.problem.nominal.compliance[i][0]; less.len()])));
+                column.add(d.problem.cell(Channel::JointTorque, i), &less);
                 vec![column]
             })
             .penalised(1.0),
