@@ -68,7 +68,7 @@ impl Refused {
 }
 
 impl HeldOut<'_> {
-    /// Takes back what does not hold, or takes a rival that does in its place; tells the first effect, if it went without one.
+    /// Takes back what does not hold or need not be said, or takes a rival that does in its place; tells the first effect, if it went without one.
     pub(crate) fn judge(
         &self,
         answer: &mut Answer,
@@ -77,25 +77,27 @@ impl HeldOut<'_> {
         thresholds: &Thresholds,
     ) -> Option<Refused> {
         let mut refused = None;
-        // Each step takes an effect back, or a rival that holds there; a rival that no longer does is not exchanged again.
+        // Each step takes an effect back, or a rival that holds there, or a plainer one; a rival that no longer does is not exchanged again.
         loop {
             let all = sized(&answer.effects, estimates);
             // Points have offset, play and coupling on every joint.
             let needless = |k: usize| !self.problem.of_points() && is_needless(answer, estimates, k);
             let fails = |k: &usize| needless(*k) || !self.holds(answer, &all, *k, thresholds);
             let Some(k) = (0..all.len()).rev().find(fails) else { return refused };
-            let rival = match (answer.effects[k].second, needless(k)) {
-                (true, _) => None,
-                (false, true) => plainer(&answer.effects[k]),
-                (false, false) => self.rival(answer, &all, k, thresholds),
-            };
+            let needless = needless(k);
+            if let Some(plainer) = plainer(answer, k).filter(|_| needless) {
+                answer.prefer(k, plainer);
+                *estimates = sizes(answer);
+                continue;
+            }
+            let rival = if needless || answer.effects[k].second { None } else { self.rival(answer, &all, k, thresholds) };
             if let Some(rival) = rival {
                 answer.exchange(k, rival);
             } else {
                 let cell = main_cell(self.floors, all[k].0, all[k].1);
                 let rms = self.without_and_with(&all, k, all[k], cell).map(|(without, with, _)| [without.sqrt(), with.sqrt()]);
                 let effect = answer.take_back(k);
-                let large = effect.gain.nats >= BARELY * thresholds.nats && effect.is_named();
+                let large = effect.gain.nats >= BARELY * thresholds.nats && effect.is_named() && !needless;
                 if let (0, true, Some(rms), None) = (k, large, rms, &refused) {
                     refused = Some(Refused { effect, cell, rms, later: self.is_later_part() });
                 }
@@ -192,22 +194,25 @@ fn is_needless(answer: &Answer, estimates: &[Estimate], k: usize) -> bool {
     let place = |effect: &Effect| effect.chosen.candidate.family.joints.first().copied();
     let of_one_place = |other: &Effect| place(other).is_none() || place(effect).is_none() || place(other) == place(effect);
     let beside_larger = answer.effects.iter().any(|other| other.gain.nats > effect.gain.nats && of_one_place(other));
-    effect.is_named()
-        && (beside_larger || plainer(effect).is_some())
-        && estimates[k].may_be_nothing(effect.chosen.candidate.family.physics)
+    let asked = if has_level(&effect.chosen.candidate) { plainer(answer, k).is_some() } else { beside_larger };
+    asked && effect.is_named() && estimates[k].may_be_nothing(&effect.chosen.candidate.family)
+}
+
+/// Is it friction by load with a level?
+fn has_level(candidate: &Candidate) -> bool {
+    candidate.family.physics == "load_dependent_friction" && candidate.columns.len() > 1
 }
 
 /// The rival that an effect is where its own number is nothing: friction by load and a level is the level.
-fn plainer(effect: &Effect) -> Option<usize> {
+fn plainer(answer: &Answer, k: usize) -> Option<usize> {
+    let effect = &answer.effects[k];
     let own = &effect.chosen.candidate;
-    if own.family.physics != "load_dependent_friction" || own.columns.len() < 2 {
-        return None;
-    }
     let is_its_level = |rival: &Scored| {
         let family = &rival.candidate.family;
         family.physics == "coulomb_friction" && family.joints == own.family.joints && rival.score >= NEAR * effect.chosen.score
     };
-    effect.rivals.iter().position(is_its_level)
+    let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
+    effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| has_level(own))
 }
 
 /// Is an effect the only one, and accepted barely or bent in many numbers?

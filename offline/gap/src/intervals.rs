@@ -1,6 +1,6 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, GROUND, START, Window, rounds};
+use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, START, STRIBECK_RANGE, Window, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parallel;
 use crate::parameters::{Named, parameters};
@@ -27,18 +27,15 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Do the intervals of what says how large an effect is all hold that it is not there?
-    pub(crate) fn may_be_nothing(&self, physics: &str) -> bool {
-        let sizes = sizes(physics);
-        let mut own = sizes.iter().flat_map(|(name, none)| {
-            self.parameters.iter().filter(move |(named, _)| named.name == *name).map(move |(_, interval)| (*none, interval))
-        });
-        let mut some = false;
-        own.all(|(none, [least, most])| {
-            some = true;
-            // What is not asked, a number that the form has not, says nothing.
-            least < most && *least <= none && none <= *most
-        }) && some
+    /// Do the intervals of what says how large an effect is all hold that it is not there? Of forms that are something else besides that is not asked.
+    pub(crate) fn may_be_nothing(&self, family: &Family) -> bool {
+        let sizes = sizes(family.physics, family.form);
+        let own = |(name, none): &(&str, f64)| {
+            let interval = self.parameters.iter().find(|(named, _)| named.name == *name).map(|(_, interval)| interval);
+            interval.map(|[least, most]| *least <= *none && *none <= *most)
+        };
+        let mut told = sizes.iter().filter_map(own).peekable();
+        told.peek().is_some() && told.all(|holds| holds)
     }
 
     /// Intervals that hold another estimate's as well, of the numbers that both have.
@@ -88,27 +85,27 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
     }
 }
 
-/// The numbers that say how large an effect is, with what they are where there is none. None of what warms up, whose size and time constant
-/// make up for one another, nor of a soft cable, which is none where it is infinitely stiff.
-fn sizes(physics: &str) -> &'static [(&'static str, f64)] {
-    match physics {
-        "coulomb_friction" => &[("f_c", 0.0)],
-        "viscous_friction" | "backlash" => &[("b", 0.0)],
-        "load_dependent_friction" => &[("mu_l", 0.0)],
-        "cable_hysteresis" => &[("a", 1.0)],
-        "cable_creep" => &[("J_k", 0.0)],
-        "joint_coupling" => &[("c_ij", 0.0)],
-        "payload" => &[("m_p", 0.0)],
-        "gravity_direction" => &[("a", 0.0), ("b", 0.0)],
-        "link_inertia" => &[("dpi_B", 0.0)],
-        "motor_torque_scale" => &[("kappa", 1.0)],
-        "torque_ripple" => &[("amp", 0.0)],
-        "joint_offset" => &[("o", 0.0)],
-        "transmission_ratio" => &[("e", 0.0)],
-        "pulley_eccentricity" => &[("e_over_r", 0.0)],
-        "link_geometry" => &[("d_alpha", 0.0), ("d_length", 0.0)],
-        "measurement_delay" => &[("d", 0.0), ("clock_drift", 0.0)],
-        "frame_misalignment" => &[("w_x", 0.0), ("w_y", 0.0), ("w_z", 0.0), ("t_x", 0.0), ("t_y", 0.0), ("t_z", 0.0)],
+/// The numbers that say how large an effect is, with what they are where there is none. Not of forms with other coefficients (a place, a
+/// constant, the other numbers of a link), of what warms up or creeps, whose size and time constant make up for one another, nor of what is none
+/// where a number is infinite, or of a curve or a wall, which are not one number.
+fn sizes(physics: &str, form: &str) -> &'static [(&'static str, f64)] {
+    match (physics, form) {
+        ("coulomb_friction", _) => &[("f_c", 0.0)],
+        ("viscous_friction" | "backlash", _) => &[("b", 0.0)],
+        ("load_dependent_friction", _) => &[("mu_l", 0.0)],
+        ("cable_hysteresis", _) => &[("a", 1.0)],
+        ("joint_coupling", "position" | "position and torque") => &[("c_ij", 0.0)],
+        ("payload", _) => &[("m_p", 0.0)],
+        ("gravity_direction", _) => &[("a", 0.0), ("b", 0.0)],
+        ("link_inertia", "scaled") => &[("dpi_B", 0.0)],
+        ("motor_torque_scale", "scale" | "scale, rounded") => &[("kappa", 1.0)],
+        ("torque_ripple", _) => &[("amp", 0.0)],
+        ("joint_offset", _) => &[("o", 0.0)],
+        ("transmission_ratio", "about zero" | "about zero, torque too") => &[("e", 0.0)],
+        ("pulley_eccentricity", _) => &[("e_over_r", 0.0)],
+        ("link_geometry", _) => &[("d_alpha", 0.0), ("d_length", 0.0)],
+        ("measurement_delay", _) => &[("d", 0.0), ("clock_drift", 0.0)],
+        ("frame_misalignment", _) => &[("w_x", 0.0), ("w_y", 0.0), ("w_z", 0.0), ("t_x", 0.0), ("t_y", 0.0), ("t_z", 0.0)],
         _ => &[],
     }
 }
@@ -133,8 +130,9 @@ fn possible(physics: &str, form: &str, name: &str) -> [f64; 2] {
         | ("cable_stretch", "k")
         | ("cable_creep", "T_k")
         | ("thermal_drift", "T")
-        | ("stribeck_friction", "v_s" | "a")
+        | ("stribeck_friction", "v_s")
         | ("pulley_eccentricity", "period") => [0.0, f64::INFINITY],
+        ("stribeck_friction", "a") => STRIBECK_RANGE,
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     }
 }

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, DRIFTS, EXPONENTS, GROUND, OWN_STIFFNESS, TOOL_TWIST, TWISTED};
+use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, STRIBECK_RANGE, TOOL_TWIST, TWISTED};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 
@@ -31,7 +31,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("f_c", effort, theta[0]),
             named("f_s", effort, theta[0] + theta[1]),
             named("v_s", unit("rad/s", "m/s"), shaped("v_s")),
-            named("a", "1", shaped("a").clamp(EXPONENTS[0], EXPONENTS[1])),
+            named("a", "1", shaped("a").clamp(STRIBECK_RANGE[0], STRIBECK_RANGE[1])),
         ],
         ("load_dependent_friction", _) => {
             let mut all = vec![named("mu_l", "1", theta[0]), named("mu_theta", "1", theta[0].max(0.0).ln_1p())];

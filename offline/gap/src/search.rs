@@ -158,14 +158,27 @@ impl Answer<'_> {
     /// Takes a rival of an effect in its place. What was chosen, and what stood before the rival, is no longer among its own rivals.
     pub fn exchange(&mut self, effect: usize, rival: usize) {
         let Some(rival) = self.effects[effect].rivals.drain(..=rival).next_back() else { return };
-        self.effects[effect].gain = rival.gain;
-        self.effects[effect].chosen = rival;
         self.effects[effect].second = true;
+        self.choose(effect, rival);
+    }
+
+    /// Takes a rival of an effect in its place; what was chosen stays one of its rivals, the first.
+    pub fn prefer(&mut self, effect: usize, rival: usize) {
+        let rival = self.effects[effect].rivals.remove(rival);
+        let chosen = self.choose(effect, rival);
+        self.effects[effect].rivals.insert(0, chosen);
+    }
+
+    /// Puts something else in the place of what was chosen, which is returned.
+    fn choose(&mut self, effect: usize, other: Scored) -> Scored {
+        self.effects[effect].gain = other.gain;
+        let chosen = std::mem::replace(&mut self.effects[effect].chosen, other);
         self.fit_anew();
         let base = self.grams_of(|k| k != effect);
         let before = self.scorer.fit(&base);
         let after = self.scorer.fit(&self.scorer.extended(&base, &self.effects[effect].chosen.candidate.columns));
         self.effects[effect].share = shares(&before, &after).into_iter().fold(0.0, f64::max);
+        chosen
     }
 
     fn grams_of(&self, which: impl Fn(usize) -> bool) -> Grams {
@@ -457,11 +470,11 @@ impl Search<'_, '_> {
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
-        // And of one joint's dry friction there is one level, and what shakes a drive shakes its cable.
+        // And of one joint's dry friction there is one level, and what ripples in a drive shakes its cable.
         let robot = self.problem.robot;
         let rest = |s: &Scored| {
             let of = |other: &Candidate| {
-                other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate) || turns_alike(other, &s.candidate, robot)
+                other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate) || ripples_alike(other, &s.candidate, robot)
             };
             others.iter().any(of)
         };
@@ -654,19 +667,15 @@ fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
 /// Difference of two periods that are one, of either.
 const ALIKE: f64 = 0.03;
 
-/// Is one a motor that ripples and the other a pulley of its joint that is out of true as often?
-fn turns_alike(one: &Candidate, other: &Candidate, robot: &Robot) -> bool {
-    let period = |candidate: &Candidate| match candidate.family.physics {
-        "torque_ripple" => {
-            let joint = candidate.family.joints[0];
-            let turn = 2.0 * std::f64::consts::PI / robot.motor_from_joint[(joint, joint)].abs();
-            candidate.shape_of("order").map(|order| turn / order)
-        }
-        "pulley_eccentricity" => candidate.shape_of("period"),
-        _ => None,
-    };
-    let (Some(own), Some(theirs)) = (period(one), period(other)) else { return false };
-    one.family.physics != other.family.physics && one.family.joints == other.family.joints && (own - theirs).abs() < ALIKE * theirs
+/// Does a motor ripple as often as a pulley of its joint is out of true?
+fn ripples_alike(ripple: &Candidate, pulley: &Candidate, robot: &Robot) -> bool {
+    let (one, other) = (&ripple.family, &pulley.family);
+    if (one.physics, other.physics) != ("torque_ripple", "pulley_eccentricity") || one.joints != other.joints {
+        return false;
+    }
+    let turn = 2.0 * std::f64::consts::PI / robot.motor_from_joint[(one.joints[0], one.joints[0])].abs();
+    let Some((order, period)) = ripple.shape_of("order").zip(pulley.shape_of("period")) else { return false };
+    (turn / order - period).abs() < ALIKE * period
 }
 
 /// May a form be there in a part of a run only?

@@ -68,7 +68,7 @@ impl Column {
         self.weighted(problem, |r, i| {
             let motion = &problem.pairs[r].real;
             let t = motion.run.elapsed_s(i);
-            motion.window.of_a_step(t - from_s) * motion.window.of_a_step(to_s - t)
+            motion.window.of_a_step(t - from_s) - motion.window.of_a_step(t - to_s)
         })
     }
 
@@ -178,21 +178,31 @@ impl<'a> Dictionary<'a> {
         self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
     }
 
-    /// What the links ask for more, per unit of it, where a joint is elsewhere and moves otherwise than its motor says: by so much position,
-    /// velocity and acceleration at a sample. The position counts where no encoder at the joint tells it.
-    pub fn moved_otherwise(&self, joint: usize, change: impl Fn(&Motion, usize) -> [f64; 3]) -> Column {
+    /// What the links ask for more, per unit of it, where joints are elsewhere and move otherwise than their motors say: by so much position,
+    /// velocity and acceleration at a sample, each joint times its share. The position counts where no encoder at the joint tells it.
+    pub fn moved_otherwise(&self, share: impl Fn(usize) -> f64, change: impl Fn(&Motion, usize) -> [f64; 3]) -> Column {
         self.asked_more(1e-3, |motion, i, state, step| {
             let [position, velocity, acceleration] = change(motion, i).map(|x| step * x);
-            if motion.deflection.is_none() {
-                state.position[joint] += position;
+            for joint in 0..state.position.len() {
+                if motion.deflection.is_none() {
+                    state.position[joint] += share(joint) * position;
+                }
+                state.velocity[joint] += share(joint) * velocity;
+                state.acceleration[joint] += share(joint) * acceleration;
             }
-            state.velocity[joint] += velocity;
-            state.acceleration[joint] += acceleration;
         })
+    }
+
+    /// Share of a strain of a drive's cable that a joint sees.
+    pub fn strain_share(&self, joint: usize, drive: usize) -> f64 {
+        self.strain_shares[(joint, drive)]
     }
 
     /// The same in other states than those believed, from a change by one step.
     pub fn asked_more(&self, step: f64, change: impl Fn(&Motion, usize, &mut State, f64)) -> Column {
+        if !self.problem.has(Channel::JointTorque) {
+            return Column::default();
+        }
         let mut evaluator = Evaluator::new(self.problem.robot, self.problem.nominal);
         let mut torques = vec![Vec::with_capacity(self.grid.len()); self.joints()];
         for (&(r, i, _), believed) in self.grid.iter().zip(&self.links()[0]) {

@@ -126,12 +126,17 @@ fn effort(dictionary: &Dictionary, tips: &Tips, force: impl Fn(usize) -> Vector3
 /// Share of the strongest direction's torque that a direction has to ask of the joints to be felt.
 const FELT: f64 = 0.02;
 
-/// Directions of a force that the joints feel: x, y and z, or, of an arm with fewer joints, those at right angles that are not borne by its bearings.
+/// Directions of a force that the joints feel, each by its own lever: x, y and z, or, of an arm with fewer joints, those at right angles that are not
+/// borne by its bearings.
 fn felt(tips: &Tips) -> Vec<Vector3<f64>> {
+    let n = tips.jacobians.first().map_or(0, |jacobian| jacobian.len() / 3);
     let mut gram = Matrix3::zeros();
-    for jacobian in &tips.jacobians {
-        let n = jacobian.len() / 3;
-        gram += Matrix3::from_fn(|a, b| (0..n).map(|j| jacobian[a * n + j] * jacobian[b * n + j]).sum());
+    for j in 0..n {
+        let mut own = Matrix3::zeros();
+        for jacobian in &tips.jacobians {
+            own += Matrix3::from_fn(|a, b| jacobian[a * n + j] * jacobian[b * n + j]);
+        }
+        gram += own / own.trace().max(1e-300);
     }
     let eigen = gram.symmetric_eigen();
     let least = FELT * FELT * eigen.eigenvalues.max();

@@ -16,10 +16,11 @@ pub(super) const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 const STRIBECK_LEAST: f64 = 0.01;
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
 const STRIBECK_SPEED: [f64; 4] = [0.03, 0.1, 0.25, 0.6];
-/// Exponents of the Stribeck curve, and their range in the vocabulary: how a sign turns round is known to its form only, and a free exponent
-/// makes up for that, at the cost of the force at rest.
+/// Exponents of the Stribeck curve to begin with.
 const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
-pub(crate) const EXPONENTS: [f64; 2] = [0.5, 2.0];
+/// Their range in the vocabulary: how a sign turns round is known to its form only, and a free exponent makes up for that, at the cost of the
+/// force at rest.
+pub(crate) const STRIBECK_RANGE: [f64; 2] = [0.5, 2.0];
 /// Most that friction at rest exceeds sliding friction by, in terms of it: twice the vocabulary's range (f_s/f_c up to 2.5). A bristle's
 /// curve at no speed at all fits the noise of standstills otherwise.
 const STATIC_EXCESS: f64 = 3.0;
@@ -140,7 +141,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {
                 let mut shape = s.to_vec();
                 shape[0] = shape[0].max(least);
-                shape[1] = shape[1].clamp(EXPONENTS[0], EXPONENTS[1]);
+                shape[1] = shape[1].clamp(STRIBECK_RANGE[0], STRIBECK_RANGE[1]);
                 let extra = d.smoothed(|r| stribeck(d, r, place, &shape, sign));
                 vec![d.effort_of(j, smooth(d, place, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
             })

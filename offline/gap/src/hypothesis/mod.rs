@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub use dictionary::{Column, Dictionary, Window};
 pub(crate) use environment::WALL;
 pub use environment::direction;
-pub(crate) use friction::{AT_MOTOR, BEFORE, EXPONENTS};
+pub(crate) use friction::{AT_MOTOR, BEFORE, STRIBECK_RANGE};
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
 

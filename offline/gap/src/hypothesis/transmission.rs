@@ -335,9 +335,10 @@ fn homed_within(dictionary: &Dictionary, j: usize) -> f64 {
 fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let ratio = move |d: &Dictionary| d.deflection_of(j, minus(&position(d, j)));
     // Work is kept: the motor turns less for the link's way, and carries its load on a longer lever. The link moves faster than the motor says.
+    let own = move |joint: usize| f64::from(u8::from(joint == j));
     let with_torque = move |d: &Dictionary| {
         let faster = |motion: &Motion, i: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| set[j][i]);
-        let mut column = ratio(d).and(d.moved_otherwise(j, faster));
+        let mut column = ratio(d).and(d.moved_otherwise(own, faster));
         column.add(d.problem.cell(Channel::JointTorque, j), &d.load(j));
         column
     };
@@ -442,13 +443,10 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         all.push(
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
                 // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one and of its cable.
-                let less = minus(&d.cable_load(j));
-                let moves = d.moved_otherwise(j, |motion, k| {
-                    [&motion.position, &motion.velocity, &motion.acceleration].map(|set| -set[i][k])
-                });
-                let mut column =
-                    coupled(d).and(moves).and(d.strain_of(i, times(&less, &vec![d.problem.nominal.compliance[i][0]; less.len()])));
-                column.add(d.problem.cell(Channel::JointTorque, i), &less);
+                let less = d.effort_of(i, minus(&d.cable_load(j)), true);
+                let way =
+                    |motion: &Motion, k: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| -set[i][k]);
+                let column = coupled(d).and(less).and(d.moved_otherwise(|joint| d.strain_share(joint, j), way));
                 vec![column]
             })
             .penalised(1.0),
