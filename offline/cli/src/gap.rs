@@ -94,7 +94,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     write(&outcome, wish.out)?;
     output::say(format_args!("{}", gap_report::words(&outcome.report)));
     if !outcome.left_out.is_empty() {
-        say!("note: of {} of the effects above corrected.toml lacks all or a part; its first lines say what and why", outcome.left_out.len());
+        say!(
+            "note: of {} of the effects above corrected.toml lacks all or a part; its first lines say what and why",
+            outcome.left_out.len()
+        );
     }
     say!("{}", wish.out.join("report.html").display());
     Ok(status(outcome.report.status))

@@ -70,7 +70,7 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         match put {
             Ok(with) => {
                 after = with;
-                if (candidate.family.physics, candidate.family.form.ends_with(", torque too")) == ("link_geometry", true) {
+                if candidate.family.physics == "link_geometry" && candidate.family.form.ends_with(", torque too") {
                     left_out.push(told(candidate, "the torque that its weight asks for then is not a term of the simulator"));
                 }
                 if candidate.family.form == LATE_COUPLING {

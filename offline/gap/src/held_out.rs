@@ -194,13 +194,8 @@ fn is_needless(answer: &Answer, estimates: &[Estimate], k: usize) -> bool {
     let place = |effect: &Effect| effect.chosen.candidate.family.joints.first().copied();
     let of_one_place = |other: &Effect| place(other).is_none() || place(effect).is_none() || place(other) == place(effect);
     let beside_larger = answer.effects.iter().any(|other| other.gain.nats > effect.gain.nats && of_one_place(other));
-    let asked = if has_level(&effect.chosen.candidate) { plainer(answer, k).is_some() } else { beside_larger };
+    let asked = if effect.chosen.candidate.is_by_load_and_level() { plainer(answer, k).is_some() } else { beside_larger };
     asked && effect.is_named() && estimates[k].may_be_nothing(&effect.chosen.candidate.family)
-}
-
-/// Is it friction by load with a level?
-fn has_level(candidate: &Candidate) -> bool {
-    candidate.family.physics == "load_dependent_friction" && candidate.columns.len() > 1
 }
 
 /// The rival that an effect is where its own number is nothing: friction by load and a level is the level.
@@ -212,7 +207,7 @@ fn plainer(answer: &Answer, k: usize) -> Option<usize> {
         family.physics == "coulomb_friction" && family.joints == own.family.joints && rival.score >= NEAR * effect.chosen.score
     };
     let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
-    effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| has_level(own))
+    effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| own.is_by_load_and_level())
 }
 
 /// Is an effect the only one, and accepted barely or bent in many numbers?

@@ -472,12 +472,9 @@ impl Search<'_, '_> {
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
         // And of one joint's dry friction there is one level, and what ripples in a drive shakes its cable.
         let robot = self.problem.robot;
-        let rest = |s: &Scored| {
-            let of = |other: &Candidate| {
-                other.shares_edge(&s.candidate) || levels_twice(other, &s.candidate) || ripples_alike(other, &s.candidate, robot)
-            };
-            others.iter().any(of)
-        };
+        let of =
+            |other: &Candidate, s: &Candidate| other.shares_edge(s) || levels_twice(other, s) || ripples_alike(other, s, robot);
+        let rest = |s: &Scored| others.iter().any(|other| of(other, &s.candidate));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
@@ -656,10 +653,8 @@ fn to_judge(ranked: &[Scored]) -> Vec<&Scored> {
 
 /// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
-    let has_level = |candidate: &Candidate| match candidate.family.physics {
-        "coulomb_friction" | "stribeck_friction" => true,
-        "load_dependent_friction" => candidate.columns.len() > 1,
-        _ => false,
+    let has_level = |candidate: &Candidate| {
+        matches!(candidate.family.physics, "coulomb_friction" | "stribeck_friction") || candidate.is_by_load_and_level()
     };
     one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
 }

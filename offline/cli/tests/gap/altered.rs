@@ -1,6 +1,6 @@
 //! Recordings of the generator, altered: causes that it does not make, at times at which it does not begin them.
 
-use crate::common::{Case, holds, lines, made, named, near, primary, wanted, with_columns};
+use crate::common::{Case, case_of, holds, lines, made, named, near, primary, wanted, with_columns};
 use crate::program::{Folder, done, text};
 use arm::serial::Workspace;
 use gap_report::Status;
@@ -122,4 +122,18 @@ fn friction_by_the_weight_that_a_joint_holds_is_friction_by_load() {
     );
     let report = case.judged(&folder.file("out"));
     near(named(&report, "load_dependent_friction", "shoulder"), "mu_l", 0.3, 0.3);
+}
+
+#[test]
+fn without_joint_encoders_a_ratio_weighs_as_it_does_where_it_was_homed() {
+    // Its torque was that of a joint that is right at zero: a pulley, with certainty.
+    let folder = Folder::new("homed");
+    let (mut case, _) = case_of(&folder, "full", 3_881_812_845, "78a8cab46b89");
+    for (k, path) in case.real.iter_mut().chain(&mut case.sim).enumerate() {
+        let without = |column: &str, _, value| (!column.starts_with("truth_jpos")).then_some(value);
+        *path = with_columns(&folder, &format!("without-{k}.csv"), path, without);
+    }
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+    near(named(&report, "transmission_ratio", "elbow"), "e", 0.0166, 0.05);
 }

@@ -54,6 +54,12 @@ pub(crate) fn written(folder: &Folder, order: &Order) -> (Case, Vec<Sealed>) {
     (Case { robot: files["robot.urdf"].clone(), real: runs("real_"), sim: runs("sim_") }, case.truth.effects)
 }
 
+/// A case of a matrix, with its truth.
+pub(crate) fn case_of(folder: &Folder, matrix: &str, seed: u64, id: &str) -> (Case, Vec<Sealed>) {
+    let orders = generator::matrix::named(matrix, seed).expect("a matrix");
+    written(folder, orders.iter().find(|order| order.id() == id).expect("the case"))
+}
+
 /// The lines of a table, gzip or not, without metadata.
 pub(crate) fn lines(path: &Path) -> Vec<String> {
     let folder = Folder::new(&format!("lines-{}", path.to_string_lossy().replace(['/', '.'], "-")));

@@ -1,7 +1,8 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
 use crate::common::{
-    Case, Folder, done, holds, made, named, near, parameter, primary, report, text, wanted, with_columns, with_effect, written,
+    Case, Folder, case_of, done, holds, made, named, near, parameter, primary, report, text, wanted, with_columns, with_effect,
+    written,
 };
 use gap_report::{Channel, RegionKind, Report, Status};
 use generator::order::{Kind, Order, Wanted};
@@ -22,9 +23,7 @@ fn of_nothing_nothing_is_said() {
 /// A case of a matrix, judged, and how many effects it has.
 fn of_matrix(matrix: &str, seed: u64, id: &str) -> (Report, usize) {
     let folder = Folder::new(id);
-    let orders = generator::matrix::named(matrix, seed).expect("a matrix");
-    let order = orders.iter().find(|order| order.id() == id).expect("the case");
-    let (case, truth) = written(&folder, order);
+    let (case, truth) = case_of(&folder, matrix, seed, id);
     (case.judged(&folder.file("out")), truth.len())
 }
 

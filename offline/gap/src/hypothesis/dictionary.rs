@@ -36,13 +36,6 @@ impl Column {
         }
     }
 
-    /// Adds to a part, or a part; a cell that is not there takes nothing.
-    pub fn add(&mut self, cell: Option<usize>, values: &[f64]) {
-        let mut more = Self::default();
-        more.push(cell, values);
-        *self = std::mem::take(self).and(more);
-    }
-
     /// With the parts of another one.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
@@ -204,18 +197,24 @@ impl<'a> Dictionary<'a> {
             return Column::default();
         }
         let mut evaluator = Evaluator::new(self.problem.robot, self.problem.nominal);
-        let mut torques = vec![Vec::with_capacity(self.grid.len()); self.joints()];
-        for (&(r, i, _), believed) in self.grid.iter().zip(&self.links()[0]) {
+        let there = self.grid.iter().map(|&(r, i, _)| {
             let motion = &self.problem.pairs[r].real;
             let mut state = motion.link(i);
             change(motion, i, &mut state, step);
-            let there = evaluator.link(&state);
-            torques
-                .iter_mut()
-                .zip(there.iter().zip(believed))
-                .for_each(|(column, (there, here))| column.push((there - here) / step));
-        }
-        self.effort(&torques.into_iter().map(Some).collect::<Vec<_>>(), false)
+            evaluator.link(&state)
+        });
+        self.difference(&there.collect::<Vec<_>>(), self.believed(), step, false)
+    }
+
+    /// Joint torques per unit between two loads of the links, row by row, that are a step apart.
+    pub fn difference(&self, there: &[Vec<f64>], here: &[Vec<f64>], step: f64, at_link: bool) -> Column {
+        let of = |j: usize| there.iter().zip(here).map(|(there, here)| (there[j] - here[j]) / step).collect();
+        self.effort(&(0..self.joints()).map(|j| Some(of(j))).collect::<Vec<_>>(), at_link)
+    }
+
+    /// What the links are believed to ask of the joints in their motion, without any friction, row by row.
+    pub fn believed(&self) -> &[Vec<f64>] {
+        &self.links()[0]
     }
 
     /// What the links alone ask of a joint at the grid, without any friction: in their motion, or to be held where they are.

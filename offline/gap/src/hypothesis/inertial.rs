@@ -173,8 +173,8 @@ fn push_gravity(all: &mut Vec<Family>) {
     all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[bound, bound], &["a", "b"], |d, s| {
         // Along the shortest way: first a, then b; a secant of nothing is a tangent.
         let s = [s[0], s[1]].map(|x| if x.abs() < 1e-4 { 1e-4 } else { x });
-        let (none, first, both) = (turned_load(d, 0.0, 0.0), turned_load(d, s[0], 0.0), turned_load(d, s[0], s[1]));
-        vec![difference(d, &first, &none, s[0]), difference(d, &both, &first, s[1])]
+        let (first, both) = (turned_load(d, s[0], 0.0), turned_load(d, s[0], s[1]));
+        vec![d.difference(&first, d.believed(), s[0], true), d.difference(&both, &first, s[1], true)]
     }));
 }
 
@@ -183,11 +183,4 @@ fn turned_load(dictionary: &Dictionary, a: f64, b: f64) -> Vec<Vec<f64>> {
     let mut arm = dictionary.problem.robot.arm.clone();
     arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * arm.gravity_vector());
     dictionary.loads_of(&arm)
-}
-
-/// Joint torques per unit between two loads.
-fn difference(dictionary: &Dictionary, there: &[Vec<f64>], here: &[Vec<f64>], step: f64) -> super::Column {
-    let of = |j: usize| there.iter().zip(here).map(|(t, h)| (t[j] - h[j]) / step).collect();
-    let series: Vec<Option<Vec<f64>>> = (0..dictionary.joints()).map(|j| Some(of(j))).collect();
-    dictionary.effort(&series, true)
 }

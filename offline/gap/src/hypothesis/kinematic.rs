@@ -125,12 +125,7 @@ fn changed(dictionary: &Dictionary, arm: &SerialArm, step: f64, carries: bool) -
     if !carries {
         return moved;
     }
-    let loads = dictionary.loads_of(arm);
-    let more = |j: usize| {
-        let believed = dictionary.links_alone(j, false);
-        Some(loads.iter().zip(believed).map(|(load, believed)| (load[j] - believed) / step).collect())
-    };
-    let mut torque = dictionary.effort(&(0..dictionary.joints()).map(more).collect::<Vec<_>>(), true);
+    let mut torque = dictionary.difference(&dictionary.loads_of(arm), dictionary.believed(), step, true);
     // What the cables give way by moves the tip by far less.
     torque.parts.retain(|(cell, _)| dictionary.problem.cells[*cell].channel != TIP);
     moved.and(torque)

@@ -369,6 +369,11 @@ impl Candidate {
         edges(self).iter().any(|own| edges(other).iter().any(|its| (own - its).abs() < SAME_EDGE_S))
     }
 
+    /// Is it friction by load with a level of dry friction beside?
+    pub fn is_by_load_and_level(&self) -> bool {
+        self.family.physics == "load_dependent_friction" && self.columns.len() > 1
+    }
+
     /// Are the two of the same form and shape?
     pub fn same_start(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.family, &other.family) && self.shape == other.shape

@@ -338,10 +338,11 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let own = move |joint: usize| f64::from(u8::from(joint == j));
     let with_torque = move |d: &Dictionary| {
         let faster = |motion: &Motion, i: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| set[j][i]);
-        let mut column = ratio(d).and(d.moved_otherwise(own, faster));
-        column.add(d.problem.cell(Channel::JointTorque, j), &d.load(j));
-        column
+        let mut lever = Column::default();
+        lever.push(d.problem.cell(Channel::JointTorque, j), &d.load(j));
+        ratio(d).and(d.moved_otherwise(own, faster)).and(lever)
     };
+    let elsewhere = move |d: &Dictionary| offset(d, j).and(d.moved_otherwise(own, |_, _| [1.0, 0.0, 0.0]));
     let (small, free, homed) = (Bound::Between(-0.5, 0.5), Bound::Free, Bound::Within(homed_within(dictionary, j)));
     all.push(Family::fixed("joint_offset", &[j], "constant", TRANSMISSION, &[free], move |d| vec![offset(d, j)]));
     if dictionary.problem.tip_from_truth {
@@ -369,7 +370,7 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             "about where it was homed, torque too",
             TRANSMISSION,
             &[small, homed],
-            move |d| vec![with_torque(d), offset(d, j)],
+            move |d| vec![with_torque(d), elsewhere(d)],
         )
         .penalised(1.5),
     );
@@ -446,8 +447,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                 let less = d.effort_of(i, minus(&d.cable_load(j)), true);
                 let way =
                     |motion: &Motion, k: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| -set[i][k]);
-                let column = coupled(d).and(less).and(d.moved_otherwise(|joint| d.strain_share(joint, j), way));
-                vec![column]
+                vec![coupled(d).and(less).and(d.moved_otherwise(|joint| d.strain_share(joint, j), way))]
             })
             .penalised(1.0),
         );
