@@ -9,7 +9,7 @@ use simulator::model::RobotModel;
 
 use crate::gates;
 use crate::held_out::{HeldOut, Refused, sized};
-use crate::hypothesis::Dictionary;
+use crate::hypothesis::{Dictionary, LATE_TORQUES};
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
@@ -355,6 +355,7 @@ fn analyse_with(
     let prior = match (sims.is_empty() || !at_its_word, from_recording) {
         (true, _) => Prior::Believed,
         (false, true) => Prior::Drifting,
+        (false, false) if !apart.is_empty() => Prior::Apart,
         (false, false) => Prior::Exact,
     };
     let mut problem = prior.put_on(problem);
@@ -399,7 +400,7 @@ fn analyse_with(
     let late = answer.effects.iter().zip(&estimates).any(|(effect, estimate)| {
         let family = &effect.chosen.candidate.family;
         let motors = family.form == "joint encoders" && estimate.coefficients[0] < 0.0;
-        family.physics == "measurement_delay" && (motors || family.form == "torque")
+        family.physics == "measurement_delay" && (motors || LATE_TORQUES.contains(&family.form))
     });
     let simulated_by_lab = given.iter().all(|one| one.sim.is_some());
     let found = Found {
@@ -464,7 +465,9 @@ enum Prior {
     Believed,
     /// Learnt from another recording.
     Drifting,
-    /// Learnt from a simulation.
+    /// Learnt from simulations that move otherwise.
+    Apart,
+    /// Learnt from simulations of the same motion.
     Exact,
 }
 
@@ -473,6 +476,7 @@ impl Prior {
         match self {
             Self::Believed => problem.believed_roughly(),
             Self::Drifting => problem.learnt_from_recording(),
+            Self::Apart => problem.not_by_sample(),
             Self::Exact => problem,
         }
     }

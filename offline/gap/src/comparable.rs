@@ -77,11 +77,13 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
 fn too_far(robot: &Robot, runs: &[Both], j: usize) -> Option<DataQuality> {
     let allowed = robot.range(j);
     let unit = robot.position_unit(j);
-    runs.iter().flat_map(|(real, sim)| std::iter::once(real).chain(sim)).find_map(|run| {
+    let all =
+        runs.iter().flat_map(|(real, sim)| [Some((real, "")), sim.as_ref().map(|sim| (sim, ", or a simulation that ran away"))]);
+    all.flatten().find_map(|(run, otherwise)| {
         let (low, high) = range(run.position[j].iter().copied());
         (allowed > 0.0 && high - low > BEYOND_RANGE * allowed).then(|| {
             let message = format!(
-                "{} moves through {:.3} {unit} in {}, {:.0} times what it can: positions in another unit, counts, or of another robot; \
+                "{} moves through {:.3} {unit} in {}, {:.0} times what it can: positions in another unit, counts, or of another robot{otherwise}; \
                  convert them, or give this robot with --robot",
                 robot.joints[j],
                 high - low,

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, SENSOR, TOOL_LENGTH, TOOL_TWIST, direction};
+use crate::hypothesis::{AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, SENSOR, TOOL_LENGTH, TOOL_TWIST, direction};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -255,7 +255,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
         }
         ("measurement_delay", form) => Bound::Channel(match form {
             "joint encoders" => DelayChannel::Transmission,
-            "torque" => return Err("the simulator has no late torque".to_owned()),
+            form if LATE_TORQUES.contains(&form) => return Err("the simulator has no late torque".to_owned()),
             _ => DelayChannel::EndEffector,
         }),
         ("payload" | "gravity_direction" | "frame_misalignment", _) => Bound::Robot,

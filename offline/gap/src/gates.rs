@@ -24,6 +24,7 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
+            all.extend(itself(real, sim));
         }
     }
     all.sort_by_key(|q| match q.level {
@@ -91,6 +92,15 @@ fn input_sign(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         ));
     }
     all
+}
+
+/// A simulation that is the recording.
+fn itself(real: &Run, sim: &Run) -> Option<DataQuality> {
+    (real.position == sim.position && real.torque == sim.torque && real.truth == sim.truth).then(|| {
+        let message =
+            format!("the simulation {} is this recording, sample for sample: give what a simulator made of its commands", sim.id);
+        DataQuality::new("same_motion", Level::Warn, message).run(real.id.clone())
+    })
 }
 
 /// Joints that do not move.

@@ -19,6 +19,10 @@ const BARELY: f64 = 3.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.
 const INSTEAD: f64 = 0.5;
 const NEAR: f64 = 0.3;
+/// Share of what the largest effect explains from which on another one is something, whatever its own number says; and how often a rival may be
+/// taken for what says it.
+const LARGE: f64 = 0.1;
+const ANEW: usize = 6;
 /// Of its squared size where it was fitted, what it has to have there to be judged.
 const SHOWS: f64 = 1e-6;
 /// What may be otherwise in each run: whether the hand touches, how warm a drive is when it begins.
@@ -76,20 +80,29 @@ impl HeldOut<'_> {
         sizes: &dyn Fn(&Answer) -> Vec<Estimate>,
         thresholds: &Thresholds,
     ) -> Option<Refused> {
-        let mut refused = None;
+        let (mut refused, mut anew) = (None, 0);
         // Each step takes an effect back, or a rival that holds there, or a plainer one; a rival that no longer does is not exchanged again.
         loop {
             let all = sized(&answer.effects, estimates);
             // Points have offset, play and coupling on every joint.
             let needless = |k: usize| !self.problem.of_points() && is_needless(answer, estimates, k);
-            let fails = |k: &usize| needless(*k) || !self.holds(answer, &all, *k, thresholds);
+            // What is as large is something, though not by its own number: a rival says it, or none does.
+            let named_anew =
+                |k: usize| (anew < ANEW && is_large(answer, k)).then(|| self.rival(answer, &all, k, thresholds)).flatten();
+            let fails = |k: &usize| {
+                let needless = needless(*k) && (!is_large(answer, *k) || plainer(answer, *k).is_some() || named_anew(*k).is_some());
+                needless || !self.holds(answer, &all, *k, thresholds)
+            };
             let Some(k) = (0..all.len()).rev().find(fails) else { return refused };
             let needless = needless(k);
-            if let Some(plainer) = plainer(answer, k).filter(|_| needless) {
-                answer.prefer(k, plainer);
+            let instead = if needless { plainer(answer, k).or_else(|| named_anew(k)) } else { None };
+            if let Some(instead) = instead {
+                anew += 1;
+                answer.prefer(k, instead);
                 *estimates = sizes(answer);
                 continue;
             }
+            let needless = needless && !is_large(answer, k);
             let rival = if needless || answer.effects[k].second { None } else { self.rival(answer, &all, k, thresholds) };
             if let Some(rival) = rival {
                 answer.exchange(k, rival);
@@ -196,6 +209,12 @@ fn is_needless(answer: &Answer, estimates: &[Estimate], k: usize) -> bool {
     let beside_larger = answer.effects.iter().any(|other| other.gain.nats > effect.gain.nats && of_one_place(other));
     let asked = if effect.chosen.candidate.is_by_load_and_level() { plainer(answer, k).is_some() } else { beside_larger };
     asked && effect.is_named() && estimates[k].may_be_nothing(&effect.chosen.candidate.family)
+}
+
+/// Does an effect explain a good part of what the largest one does?
+fn is_large(answer: &Answer, k: usize) -> bool {
+    let largest = answer.effects.iter().map(|effect| effect.gain.nats).fold(0.0, f64::max);
+    answer.effects[k].gain.nats > LARGE * largest
 }
 
 /// The rival that an effect is where its own number is nothing: friction by load and a level is the level.

@@ -1,6 +1,8 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, START, STRIBECK_RANGE, Window, rounds};
+use crate::hypothesis::{
+    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, START, STRIBECK_RANGE, Window, rounds,
+};
 use crate::nominal::{Nominal, rms};
 use crate::parallel;
 use crate::parameters::{Named, parameters};
@@ -70,7 +72,7 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("payload", "m_p") if form == AT_THE_TIP => 0.25,
         ("cable_creep", "T_k") | ("external_contact", "p") | ("gravity_direction", _) => 0.2,
         // How steeply dry friction turns round says how late it is.
-        ("measurement_delay", _) if form == "torque" => 0.2,
+        ("measurement_delay", _) if form == LATE_TORQUES[0] => 0.2,
         ("cable_hysteresis" | "thermal_drift", _) => 0.15,
         ("cable_stretch", _) | ("external_contact", "k") => 0.12,
         ("cable_creep", _) => 0.1,

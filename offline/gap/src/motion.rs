@@ -225,24 +225,7 @@ mod tests {
         let mut mask = vec![false; count as usize];
         mask[1000..1100].fill(true);
         mask[90] = true;
-        let run = Run {
-            id: String::new(),
-            start_s: 0.0,
-            since_s: 0.0,
-            past: crate::past::Past::default(),
-            dt_s: 0.001,
-            points: false,
-            position: vec![series.clone()],
-            drive: vec![series.clone()],
-            torque: None,
-            truth: None,
-            command: None,
-            motor: None,
-            tip: Some([series.clone(), series.clone(), series]),
-            mask,
-            left_out: Vec::new(),
-            saturated: Vec::new(),
-        };
+        let run = Run { tip: Some([series.clone(), series.clone(), series.clone()]), mask, ..Run::of_one_joint(&series) };
         let motion = Motion::new(run, Band::SLOW);
         let margin = motion.window.margin();
         for rows in [&motion.rows, &motion.tip_rows] {

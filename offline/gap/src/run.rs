@@ -541,17 +541,28 @@ pub fn apart(real: &Run, sim: &Run, joint: usize) -> (f64, f64) {
 
 /// Share of the recording's own jitter from which on a simulation's torque is not that of a simulation.
 const JITTER: f64 = 0.3;
+/// Share of the recording's own jitter that is left between two torques which are one: noise of its own would leave all of it, and more.
+const ONE_JITTER: f64 = 0.5;
 
-/// Does the torque of one jitter like that of the other?
+/// Does the torque of one jitter like that of the other, by a noise of its own? A torque that was copied, or drove the simulation, has the other's.
 pub fn as_noisy(real: &Run, sim: &Run) -> bool {
-    let jitter = |run: &Run, j: usize| {
-        let series = run.torque.as_ref().map_or(&[][..], |torque| &torque[j]);
-        let mut steps: Vec<f64> = series.windows(4).map(|x| (x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).abs()).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied().unwrap_or(0.0)
-    };
+    let torque = |run: &Run, j: usize| run.torque.as_ref().map_or_else(Vec::new, |torque| torque[j].clone());
     let n = real.position.len();
-    2 * (0..n).filter(|&j| jitter(sim, j) > JITTER * jitter(real, j)).count() > n
+    let noisy = (0..n).filter(|&j| jitter(&torque(sim, j)) > JITTER * jitter(&torque(real, j))).count();
+    let of_its_own = |(real, sim): &(Run, Run), j: usize| {
+        let (real, sim) = (torque(real, j), torque(sim, j));
+        let between: Vec<f64> = real.iter().zip(&sim).map(|(real, sim)| real - sim).collect();
+        jitter(&between) > ONE_JITTER * jitter(&real)
+    };
+    let copied = common(real, sim).is_ok_and(|both| 2 * (0..n).filter(|&j| of_its_own(&both, j)).count() <= n);
+    2 * noisy > n && !copied
+}
+
+/// How much a series jitters: the median of its third differences.
+fn jitter(series: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = series.windows(4).map(|x| (x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.
@@ -615,6 +626,31 @@ fn is_table(recording: &Recording, robot: &Robot) -> bool {
         let (n, unit) = (j + 1, robot.position_unit(j));
         [format!("truth_jpos_{n}_{unit}"), format!("q_act_{n}"), format!("q_act_{n}_{unit}")].iter().any(has)
     })
+}
+
+#[cfg(test)]
+impl Run {
+    /// One joint at places 1 ms apart.
+    pub(crate) fn of_one_joint(series: &[f64]) -> Self {
+        Self {
+            id: String::new(),
+            start_s: 0.0,
+            since_s: 0.0,
+            past: Past::default(),
+            dt_s: 0.001,
+            points: false,
+            position: vec![series.to_vec()],
+            drive: vec![series.to_vec()],
+            torque: None,
+            truth: None,
+            command: None,
+            motor: None,
+            tip: None,
+            mask: vec![false; series.len()],
+            left_out: Vec::new(),
+            saturated: Vec::new(),
+        }
+    }
 }
 
 #[cfg(test)]

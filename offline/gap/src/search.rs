@@ -239,8 +239,14 @@ pub fn search<'p>(
             let judged = search.judged(&base, &chosen, scored);
             trace(format!("  judged: {} {judged:.2?}", describe(scored)));
             if search.accepts(scored, &judged) {
-                accepted = Some(scored.clone());
-                break;
+                // One that removes little stands only where none removes more.
+                let little = judged.share < thresholds.share;
+                if !little || accepted.is_none() {
+                    accepted = Some(scored.clone());
+                }
+                if !little {
+                    break;
+                }
             }
             next = next.or_else(|| Some(scored.clone()));
         }

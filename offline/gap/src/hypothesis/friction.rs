@@ -94,6 +94,9 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     let speeds = (&[("v_eps", true)][..], product(&[&slowest]), by_speed as Turn);
     let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), by_travel as Turn);
     let heated = product(&[&HEATING_S, &BEFORE_S]);
+    // No more can fade than there is.
+    let coulomb = dictionary.problem.nominal.drives[j][2];
+    let fades = if coulomb > 0.0 { Bound::Between(-coulomb, coulomb) } else { Bound::Free };
     for (names, starts, sign) in [speeds, bristles] {
         all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
             vec![d.effort_of(j, smooth(d, place, s, sign), at_link)]
@@ -116,7 +119,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
                     &[j],
                     "friction fades",
                     TORQUE,
-                    &[Bound::Free],
+                    &[fades],
                     &[&[("T", true), (BEFORE, true)], names].concat(),
                     heated.iter().flat_map(|heat| starts.iter().map(move |s| [heat, &s[..]].concat())).collect(),
                     move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],

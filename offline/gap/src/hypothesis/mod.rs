@@ -12,6 +12,7 @@ mod transmission;
 mod unknown;
 
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
+pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
 pub use unknown::UNMODELLED;
 pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};

@@ -8,6 +8,9 @@ use crate::problem::Channel;
 /// Least delay of a torque, late or early, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
 const LEAST_LATE_S: f64 = 5e-4;
 
+/// Forms of a late torque: of what the model asks of the motors, and of what the simulation does.
+pub(crate) const LATE_TORQUES: [&str; 2] = ["torque", "torque, as simulated"];
+
 /// Rows over which a slope is drawn at least. Over less, noise in what the model asks makes steep slopes pass for small delays (6 % too small over
 /// one row, and one in ten not told); over more, slopes are flatter than they are (8 % too large over two).
 const ROWS: f64 = 1.5;
@@ -39,10 +42,18 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
     if problem.cell(Channel::JointTorque, 0).is_some() {
         // Late is all of it. What only the sign of dry friction says is how that turns, slowly or after a moment's sticking.
-        let family = Family::secant("measurement_delay", &[], "torque", Channel::JointTorque, &[bound], &["late"], |d, s| {
-            vec![late_torque(d, s[0], |load, dry| load + dry)]
-        });
-        all.push(family.borne_out(LEAST_LATE_S, |d| vec![late_torque(d, 0.0, |load, _| load), late_torque(d, 0.0, |_, dry| dry)]));
+        let mut sources: Vec<(&'static str, Source)> = vec![(LATE_TORQUES[0], believed)];
+        if problem.pairs.iter().all(|pair| pair.sim.as_ref().is_some_and(|sim| sim.torque.is_some())) {
+            sources.push((LATE_TORQUES[1], simulated));
+        }
+        for (form, source) in sources {
+            let family = Family::secant("measurement_delay", &[], form, Channel::JointTorque, &[bound], &["late"], move |d, s| {
+                vec![late_torque(d, s[0], source, |load, dry| load + dry)]
+            });
+            let parts =
+                move |d: &Dictionary| vec![late_torque(d, 0.0, source, |load, _| load), late_torque(d, 0.0, source, |_, dry| dry)];
+            all.push(family.borne_out(LEAST_LATE_S, parts));
+        }
     }
 }
 
@@ -56,9 +67,29 @@ fn late_tip(dictionary: &Dictionary, weight: impl Fn(usize, usize) -> f64) -> Co
     })
 }
 
-/// `(τ(t - d) - τ(t)) / d` of what the model asks of the motors, made up of their load and their dry friction: the slope over the time between,
-/// and over [`ROWS`] at least.
-fn late_torque(dictionary: &Dictionary, late_s: f64, of: impl Fn(f64, f64) -> f64) -> Column {
+/// What is asked of a motor in a run without its dry friction, and the samples where that is known.
+type Source = fn(&Dictionary, usize, usize) -> (Vec<f64>, Vec<f64>);
+
+/// By the model, at its rows.
+fn believed(dictionary: &Dictionary, run: usize, joint: usize) -> (Vec<f64>, Vec<f64>) {
+    let problem = dictionary.problem;
+    let rows = problem.pairs[run].real.rows.iter().map(|i| *i as f64).collect();
+    (rows, problem.loads[run].iter().map(|load| load.motor[joint]).collect())
+}
+
+/// By the simulation, in which the cables are as elastic as they are; at every sample.
+fn simulated(dictionary: &Dictionary, run: usize, joint: usize) -> (Vec<f64>, Vec<f64>) {
+    let pair = &dictionary.problem.pairs[run];
+    let sim = pair.sim.as_ref().unwrap_or(&pair.real);
+    let coulomb = dictionary.problem.nominal.drives[joint][2];
+    let torque = &sim.torque.as_ref().expect("there are residuals of torque")[joint];
+    let loads: Vec<f64> = torque.iter().zip(sign_series(sim, joint)).map(|(torque, sign)| torque - coulomb * sign).collect();
+    ((0..loads.len()).map(|i| i as f64).collect(), loads)
+}
+
+/// `(τ(t - d) - τ(t)) / d` of what is asked of the motors, made up of their load and their dry friction: the slope over the time between, and over
+/// [`ROWS`] of what is known at least.
+fn late_torque(dictionary: &Dictionary, late_s: f64, source: Source, of: impl Fn(f64, f64) -> f64) -> Column {
     let problem = dictionary.problem;
     let mut column = Column::default();
     for j in 0..dictionary.joints() {
@@ -68,16 +99,16 @@ fn late_torque(dictionary: &Dictionary, late_s: f64, of: impl Fn(f64, f64) -> f6
             let motion = &pair.real;
             let sign = sign_series(motion, j);
             let every: Vec<f64> = (0..sign.len()).map(|i| i as f64).collect();
-            let rows: Vec<f64> = motion.rows.iter().map(|i| *i as f64).collect();
-            let loads: Vec<f64> = problem.loads[r].iter().map(|load| load.motor[j]).collect();
-            let torque = |at: f64| of(between(&rows, &loads, at), coulomb * between(&every, &sign, at));
+            let (places, loads) = source(dictionary, r, j);
+            let torque = |at: f64| of(between(&places, &loads, at), coulomb * between(&every, &sign, at));
             let late = late_s / motion.run.dt_s;
-            let over = late.abs().max(ROWS * motion.step() as f64);
-            let of_row = |row: &f64| {
-                let middle = row - 0.5 * late;
+            let apart = places.get(1).map_or(1.0, |second| second - places[0]);
+            let over = late.abs().max(ROWS * apart);
+            let of_row = |row: &usize| {
+                let middle = *row as f64 - 0.5 * late;
                 (torque(middle - 0.5 * over) - torque(middle + 0.5 * over)) / (over * motion.run.dt_s)
             };
-            slope.extend(rows.iter().map(of_row));
+            slope.extend(motion.rows.iter().map(of_row));
         }
         column.push(problem.cell(Channel::JointTorque, j), &slope);
     }

@@ -15,7 +15,7 @@ const WIDTHS: [f64; 12] = [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 
 const COUPLED_WIDTHS: [f64; 5] = [0.05, 0.15, 0.3, 0.5, 0.8];
 /// Times in which the usual load carries a link across its play, to begin with, s.
 const CARRIED_S: [f64; 4] = [0.003, 0.02, 0.08, 0.3];
-/// Loads over which a loaded joint crosses its play, shares of the RMS load.
+/// Loads over which a loaded joint crosses its play, shares of the RMS load; over all of that it is a spring.
 const CROSSING: [f64; 4] = [0.02, 0.06, 0.15, 0.4];
 /// The form of a coupling by a cable that has play itself.
 pub(crate) const LATE_COUPLING: &str = "position, with play";
@@ -33,6 +33,8 @@ const CREEP_S: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 15.0, 50.0, 150.0, 500.0];
 const BEGUN: f64 = 2.0;
 /// How many of the time constants are tried where it was under way: of the longer ones the start is but an offset.
 const UNDER_WAY: usize = 6;
+/// Longest time in which a damped cable gives way, s.
+const DAMPED_S: f64 = 0.05;
 /// Over so many time constants its load is averaged where its past is not known.
 const AVERAGED: f64 = 2.0;
 /// Times its usual load to which a cable may have crept at the start.
@@ -118,7 +120,10 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             &[Bound::Positive],
             &[("crossing", true)],
             product(&[&CROSSING.map(|share| share * usual)]),
-            move |d, s| vec![d.strain_of(j, d.cable_load(j).iter().map(|l| 0.5 * (l / s[0]).tanh()).collect())],
+            move |d, s| {
+                let crossing = s[0].min(usual);
+                vec![d.strain_of(j, d.cable_load(j).iter().map(|l| 0.5 * (l / crossing).tanh()).collect())]
+            },
         )
         .penalised(1.5),
     );
@@ -169,6 +174,13 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
+    // Its damper is stiff beside a softer spring: it gives way late.
+    let damped = [Bound::Positive, Bound::UpTo(DAMPED_S)];
+    let family = Family::fixed("cable_stretch", &[j], "linear, damped", TRANSMISSION, &damped, move |d| {
+        let load = d.cable_load(j);
+        vec![d.strain_of(j, load.clone()), d.strain_of(j, minus(&rate(d, &load)))]
+    });
+    all.push(family.penalised(1.0));
     hysteresis::push(dictionary, j, usual, all);
     let begun: Settled = |s| 1.0 - (-s[1].clamp(0.0, BEGUN * s[0]) / s[0]).exp();
     for (form, shape, grid, settled) in [
@@ -253,6 +265,21 @@ fn left_of_before(dictionary: &Dictionary, j: usize, time_s: f64) -> Vec<f64> {
         let run = &dictionary.problem.pairs[r].real.run;
         if run.since_s > 0.0 { 0.0 } else { usual * (-run.elapsed_s(i) / time_s).exp() }
     })
+}
+
+/// Rate of a grid series, 1/s, run by run.
+fn rate(dictionary: &Dictionary, series: &[f64]) -> Vec<f64> {
+    let grid = &dictionary.grid;
+    (0..grid.len())
+        .map(|row| {
+            let of_run = |other: usize| grid.get(other).is_some_and(|there| there.0 == grid[row].0);
+            let before = row.checked_sub(1).filter(|other| of_run(*other)).unwrap_or(row);
+            let after = if of_run(row + 1) { row + 1 } else { row };
+            let run = &dictionary.problem.pairs[grid[row].0].real.run;
+            let time_s = run.elapsed_s(grid[after].1) - run.elapsed_s(grid[before].1);
+            if time_s > 0.0 { (series[after] - series[before]) / time_s } else { 0.0 }
+        })
+        .collect()
 }
 
 /// Seconds between rows.

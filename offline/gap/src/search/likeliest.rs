@@ -10,7 +10,7 @@ use crate::robot::Robot;
 const HOLDS: [(&str, &[&str], &str, f64); 4] = [
     ("link_inertia", &[], "payload", 0.03),
     (UNMODELLED, &HARDENING, "cable_stretch", 0.02),
-    ("cable_hysteresis", &[], "cable_stretch", 0.01),
+    ("cable_hysteresis", &[], "cable_stretch", 0.015),
     // A drift that has come to its end before it is there is an offset; a cable that slips takes a moment to settle.
     ("thermal_drift", &DRIFTS, "joint_offset", 0.05),
 ];
@@ -29,13 +29,13 @@ fn held(one: &Candidate, other: &Candidate, last_link: usize) -> Option<f64> {
     (place(one) == place(other)).then_some(share)
 }
 
-/// Share of an effect by which a loop has to differ from a straight line: the load that is believed is off by as much.
-const OFF_THE_LINE: f64 = 0.1;
-/// Share of its score that a straight line may then be behind.
-const ON_THE_LINE: f64 = 0.3;
+/// Up to what the load is known by a loop may be a straight line: the share of an effect by which it has to differ from that, and the share of its
+/// score that the line may then be behind. Of a load that a simulation without this effect gives, and of one that a robot's own numbers give.
+const BY_SIMULATION: [f64; 2] = [0.03, 0.025];
+const BY_OWN_NUMBERS: [f64; 2] = [0.1, 0.3];
 
-/// Is a loop that the best claim says, up to what the load is known by, the straight line that the other one says?
-fn is_straight(best: &Scored, line: &Scored) -> bool {
+/// Is a loop that the best claim says, but for this share of it, the straight line that the other one says?
+fn is_straight(best: &Scored, line: &Scored, but_for: f64) -> bool {
     let physics = |scored: &Scored| scored.candidate.family.physics;
     if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.window != line.candidate.window {
         return false;
@@ -44,7 +44,7 @@ fn is_straight(best: &Scored, line: &Scored) -> bool {
     line.candidate.columns.iter().flat_map(|column| &column.parts).all(|(cell, _)| {
         let (loops, straight) = (effect(best, *cell), effect(line, *cell));
         let overlap = dot(&loops, &straight).powi(2) / (dot(&loops, &loops) * dot(&straight, &straight)).max(1e-300);
-        loops.len() == straight.len() && overlap > 1.0 - OFF_THE_LINE * OFF_THE_LINE
+        loops.len() == straight.len() && overlap > 1.0 - but_for * but_for
     })
 }
 
@@ -54,8 +54,8 @@ pub(super) fn likeliest_first(claims: &mut [Scored], equal: f64, robot: &Robot) 
     let Some(best) = claims.first() else { return };
     let good = |best: &Scored, claim: &Scored| {
         let held = held(&best.candidate, &claim.candidate, last_link);
-        let share =
-            if held.is_some() && robot.simulates_itself && is_straight(best, claim) { ON_THE_LINE } else { held.unwrap_or(equal) };
+        let [but_for, behind] = if robot.simulates_itself { BY_OWN_NUMBERS } else { BY_SIMULATION };
+        let share = if held.is_some() && is_straight(best, claim, but_for) { behind } else { held.unwrap_or(equal) };
         claim.score >= best.score - (share * best.score.abs()).max(3.0)
     };
     let likeliest = (0..claims.len()).filter(|k| good(best, &claims[*k])).max_by(|a, b| {
