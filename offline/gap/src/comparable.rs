@@ -77,9 +77,8 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
 fn too_far(robot: &Robot, runs: &[Both], j: usize) -> Option<DataQuality> {
     let allowed = robot.range(j);
     let unit = robot.position_unit(j);
-    let all =
-        runs.iter().flat_map(|(real, sim)| [Some((real, "")), sim.as_ref().map(|sim| (sim, ", or a simulation that ran away"))]);
-    all.flatten().find_map(|(run, otherwise)| {
+    let of_sim = |sim| (sim, ", or a simulation that ran away");
+    runs.iter().flat_map(|(real, sim)| std::iter::once((real, "")).chain(sim.as_ref().map(of_sim))).find_map(|(run, otherwise)| {
         let (low, high) = range(run.position[j].iter().copied());
         (allowed > 0.0 && high - low > BEYOND_RANGE * allowed).then(|| {
             let message = format!(

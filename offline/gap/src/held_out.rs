@@ -71,6 +71,18 @@ impl Refused {
     }
 }
 
+/// What becomes of an effect that does not stay as it is.
+enum Fate {
+    /// A rival says it, the first of its rivals then what was said.
+    Otherwise(usize),
+    /// A rival holds in its place.
+    Exchanged(usize),
+    /// It need not be said.
+    Needless,
+    /// It does not hold, nor does a rival.
+    Refused,
+}
+
 impl HeldOut<'_> {
     /// Takes back what does not hold or need not be said, or takes a rival that does in its place; tells the first effect, if it went without one.
     pub(crate) fn judge(
@@ -84,39 +96,60 @@ impl HeldOut<'_> {
         // Each step takes an effect back, or a rival that holds there, or a plainer one; a rival that no longer does is not exchanged again.
         loop {
             let all = sized(&answer.effects, estimates);
-            // Points have offset, play and coupling on every joint.
-            let needless = |k: usize| !self.problem.of_points() && is_needless(answer, estimates, k);
-            // What is as large is something, though not by its own number: a rival says it, or none does.
-            let named_anew =
-                |k: usize| (anew < ANEW && is_large(answer, k)).then(|| self.rival(answer, &all, k, thresholds)).flatten();
-            let fails = |k: &usize| {
-                let needless = needless(*k) && (!is_large(answer, *k) || plainer(answer, *k).is_some() || named_anew(*k).is_some());
-                needless || !self.holds(answer, &all, *k, thresholds)
-            };
-            let Some(k) = (0..all.len()).rev().find(fails) else { return refused };
-            let needless = needless(k);
-            let instead = if needless { plainer(answer, k).or_else(|| named_anew(k)) } else { None };
-            if let Some(instead) = instead {
-                anew += 1;
-                answer.prefer(k, instead);
-                *estimates = sizes(answer);
-                continue;
-            }
-            let needless = needless && !is_large(answer, k);
-            let rival = if needless || answer.effects[k].second { None } else { self.rival(answer, &all, k, thresholds) };
-            if let Some(rival) = rival {
-                answer.exchange(k, rival);
-            } else {
-                let cell = main_cell(self.floors, all[k].0, all[k].1);
-                let rms = self.without_and_with(&all, k, all[k], cell).map(|(without, with, _)| [without.sqrt(), with.sqrt()]);
-                let effect = answer.take_back(k);
-                let large = effect.gain.nats >= BARELY * thresholds.nats && effect.is_named() && !needless;
-                if let (0, true, Some(rms), None) = (k, large, rms, &refused) {
-                    refused = Some(Refused { effect, cell, rms, later: self.is_later_part() });
+            let of = |k: usize| Some((k, self.fate(answer, estimates, &all, k, thresholds, anew < ANEW)?));
+            let Some((k, fate)) = (0..all.len()).rev().find_map(of) else { return refused };
+            match fate {
+                Fate::Otherwise(other) => {
+                    anew += 1;
+                    answer.prefer(k, other);
+                }
+                Fate::Exchanged(rival) => answer.exchange(k, rival),
+                Fate::Needless => {
+                    answer.take_back(k);
+                }
+                Fate::Refused => {
+                    let cell = main_cell(self.floors, all[k].0, all[k].1);
+                    let rms = self.without_and_with(&all, k, all[k], cell).map(|(without, with, _)| [without.sqrt(), with.sqrt()]);
+                    let effect = answer.take_back(k);
+                    let large = effect.gain.nats >= BARELY * thresholds.nats && effect.is_named();
+                    if let (0, true, Some(rms), None) = (k, large, rms, &refused) {
+                        refused = Some(Refused { effect, cell, rms, later: self.is_later_part() });
+                    }
                 }
             }
             *estimates = sizes(answer);
         }
+    }
+
+    /// What becomes of an effect that does not stay as it is; `anew` says whether a rival may still be taken for what is large.
+    fn fate(
+        &self,
+        answer: &Answer,
+        estimates: &[Estimate],
+        all: &[Sized],
+        k: usize,
+        thresholds: &Thresholds,
+        anew: bool,
+    ) -> Option<Fate> {
+        let rival = || self.rival(answer, all, k, thresholds);
+        // Points have offset, play and coupling on every joint.
+        if !self.problem.of_points() && is_needless(answer, estimates, k) {
+            if let Some(plainer) = plainer(answer, k) {
+                return Some(Fate::Otherwise(plainer));
+            }
+            if !is_large(answer, k) {
+                return Some(Fate::Needless);
+            }
+            // What is as large is something, though not by its own number: a rival says it, or none does.
+            if anew && let Some(rival) = rival() {
+                return Some(Fate::Otherwise(rival));
+            }
+        }
+        if self.holds(answer, all, k, thresholds) {
+            return None;
+        }
+        let exchanged = if answer.effects[k].second { None } else { rival() };
+        Some(exchanged.map_or(Fate::Refused, Fate::Exchanged))
     }
 
     /// Is what was held out a later part of the only run?

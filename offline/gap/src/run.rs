@@ -546,16 +546,22 @@ const ONE_JITTER: f64 = 0.5;
 
 /// Does the torque of one jitter like that of the other, by a noise of its own? A torque that was copied, or drove the simulation, has the other's.
 pub fn as_noisy(real: &Run, sim: &Run) -> bool {
-    let torque = |run: &Run, j: usize| run.torque.as_ref().map_or_else(Vec::new, |torque| torque[j].clone());
     let n = real.position.len();
-    let noisy = (0..n).filter(|&j| jitter(&torque(sim, j)) > JITTER * jitter(&torque(real, j))).count();
-    let of_its_own = |(real, sim): &(Run, Run), j: usize| {
-        let (real, sim) = (torque(real, j), torque(sim, j));
-        let between: Vec<f64> = real.iter().zip(&sim).map(|(real, sim)| real - sim).collect();
-        jitter(&between) > ONE_JITTER * jitter(&real)
+    let most = |of: &dyn Fn(usize) -> bool| 2 * (0..n).filter(|j| of(*j)).count() > n;
+    let noisy = |j: usize| jitter(torque(sim, j)) > JITTER * jitter(torque(real, j));
+    let own = |(real, sim): (Run, Run)| {
+        most(&|j| {
+            let (real, sim) = (torque(&real, j), torque(&sim, j));
+            let between: Vec<f64> = real.iter().zip(sim).map(|(real, sim)| real - sim).collect();
+            jitter(&between) > ONE_JITTER * jitter(real)
+        })
     };
-    let copied = common(real, sim).is_ok_and(|both| 2 * (0..n).filter(|&j| of_its_own(&both, j)).count() <= n);
-    2 * noisy > n && !copied
+    most(&noisy) && common(real, sim).map_or(true, own)
+}
+
+/// Torque of a joint; nothing where there is none.
+fn torque(run: &Run, joint: usize) -> &[f64] {
+    run.torque.as_ref().map_or(&[], |torque| &torque[joint])
 }
 
 /// How much a series jitters: the median of its third differences.

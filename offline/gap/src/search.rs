@@ -240,13 +240,11 @@ pub fn search<'p>(
             trace(format!("  judged: {} {judged:.2?}", describe(scored)));
             if search.accepts(scored, &judged) {
                 // One that removes little stands only where none removes more.
-                let little = judged.share < thresholds.share;
-                if !little || accepted.is_none() {
+                if judged.share >= thresholds.share {
                     accepted = Some(scored.clone());
-                }
-                if !little {
                     break;
                 }
+                accepted = accepted.or_else(|| Some(scored.clone()));
             }
             next = next.or_else(|| Some(scored.clone()));
         }

@@ -34,6 +34,13 @@ fn is_no_alarm(matrix: &str, seed: u64, id: &str) {
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
 }
 
+/// The one name that is said of a case of the whole matrix, with the right joint.
+fn is_named_alone(seed: u64, id: &str, physics: &str, joint: &str) {
+    let (report, _) = of_matrix("full", seed, id);
+    named(&report, physics, joint);
+    assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+}
+
 /// A signal that is late by so many seconds from a time on.
 fn late(signal: &str, by_s: f64, from_s: f64) -> Wanted {
     Wanted { signal: Some(signal.to_owned()), interval: Some([from_s, 120.0]), ..wanted("measurement_delay", None, &[("d", by_s)]) }
@@ -43,9 +50,7 @@ fn late(signal: &str, by_s: f64, from_s: f64) -> Wanted {
 fn a_torque_is_late_in_all_it_holds_or_not_late() {
     // A quarter of a millisecond, on a null; and dry friction that turns 3 ms late where an arm hardly moves, beside a drift.
     is_no_alarm("full", 278_625_836, "25a256671f4d");
-    let (report, _) = of_matrix("full", 278_625_836, "0cd486b7a074");
-    named(&report, "thermal_drift", "shoulder");
-    assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+    is_named_alone(278_625_836, "0cd486b7a074", "thermal_drift", "shoulder");
 }
 
 #[test]
@@ -578,9 +583,7 @@ fn a_loop_that_is_a_line_within_what_the_load_is_known_by_is_a_soft_cable() {
 
 #[test]
 fn a_soft_cable_gives_way_late_and_is_no_loop() {
-    let (report, _) = of_matrix("full", 2_162_061_666, "b0c62881a512");
-    named(&report, "cable_stretch", "joint1");
-    assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+    is_named_alone(2_162_061_666, "b0c62881a512", "cable_stretch", "joint1");
 }
 
 #[test]

@@ -144,7 +144,7 @@ fn of_run(pair: &Pair) -> (String, f64) {
 }
 
 /// A grid series, run by run.
-fn parts<'s>(dictionary: &'s Dictionary, series: &'s [f64]) -> impl Iterator<Item = &'s [f64]> {
+pub(super) fn parts<'s>(dictionary: &'s Dictionary, series: &'s [f64]) -> impl Iterator<Item = &'s [f64]> {
     dictionary.problem.pairs.iter().scan(series, |rest, pair| {
         let (run, others) = rest.split_at(pair.real.rows.len());
         *rest = others;

@@ -4,7 +4,7 @@ use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, heat};
 use super::{Bound, Column, Family, hysteresis, product};
 use crate::motion::Motion;
-use crate::problem::Channel;
+use crate::problem::{Channel, Pair};
 use crate::run::Run;
 
 /// Widths of play, shares of a joint's travel.
@@ -269,17 +269,15 @@ fn left_of_before(dictionary: &Dictionary, j: usize, time_s: f64) -> Vec<f64> {
 
 /// Rate of a grid series, 1/s, run by run.
 fn rate(dictionary: &Dictionary, series: &[f64]) -> Vec<f64> {
-    let grid = &dictionary.grid;
-    (0..grid.len())
-        .map(|row| {
-            let of_run = |other: usize| grid.get(other).is_some_and(|there| there.0 == grid[row].0);
-            let before = row.checked_sub(1).filter(|other| of_run(*other)).unwrap_or(row);
-            let after = if of_run(row + 1) { row + 1 } else { row };
-            let run = &dictionary.problem.pairs[grid[row].0].real.run;
-            let time_s = run.elapsed_s(grid[after].1) - run.elapsed_s(grid[before].1);
-            if time_s > 0.0 { (series[after] - series[before]) / time_s } else { 0.0 }
-        })
-        .collect()
+    let of_run = |(pair, run): (&Pair, &[f64])| -> Vec<f64> {
+        let time_s = |row: usize| pair.real.run.elapsed_s(pair.real.rows[row]);
+        let at = |row: usize| {
+            let (before, after) = (row.saturating_sub(1), (row + 1).min(run.len() - 1));
+            if after > before { (run[after] - run[before]) / (time_s(after) - time_s(before)) } else { 0.0 }
+        };
+        (0..run.len()).map(at).collect()
+    };
+    dictionary.problem.pairs.iter().zip(hysteresis::parts(dictionary, series)).flat_map(of_run).collect()
 }
 
 /// Seconds between rows.
