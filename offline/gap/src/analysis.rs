@@ -3,13 +3,13 @@
 use std::io::Write as _;
 use std::time::Instant;
 
-use gap_report::{DataQuality, Fit, FloorMethod, Level, Pictures, Report, Space, Status};
+use gap_report::{DataQuality, Fit, FloorMethod, Level, Pictures, Report, Run as ToldRun, RunRole, Space, Status};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
 use crate::gates;
 use crate::held_out::{HeldOut, Refused, sized};
-use crate::hypothesis::{Dictionary, LATE_TORQUES};
+use crate::hypothesis::{ALWAYS, Dictionary, LATE_TORQUES, Window, Windows};
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
@@ -117,6 +117,8 @@ pub struct Outcome {
     pub left_out: Vec<String>,
     /// Mean logarithm of what is left of the residuals of held-out runs; NaN where nothing was judged.
     pub(crate) left: f64,
+    /// Times more that is left of what was held out than of what was fitted, in the channel where that is most.
+    pub(crate) elsewhere: f64,
 }
 
 /// What the search and the judgement have in common; for the parts that put it into words.
@@ -137,6 +139,8 @@ pub struct Found<'a> {
     pub answer: &'a Answer<'a>,
     /// Sizes of the effects.
     pub estimates: &'a [Estimate],
+    /// When each effect is there in what was held out.
+    pub held_windows: &'a [Option<Windows>],
     /// The ceiling.
     pub ceiling: &'a flexible::Ceiling,
     /// Noise floor of each cell, fixed before the fit.
@@ -156,6 +160,16 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
+    /// When an effect is there in a run that was held out.
+    pub(crate) fn window_there(&self, effect: usize, run: usize) -> Window {
+        self.held_windows[effect].as_ref().map_or(ALWAYS, |windows| windows.of(run))
+    }
+
+    /// Is what was held out a later part of the only run?
+    pub(crate) fn is_later_part(&self) -> bool {
+        self.held_out().is_later_part()
+    }
+
     /// What was held out.
     pub(crate) fn held_out(&self) -> HeldOut<'_> {
         HeldOut { problem: self.problem, dictionary: self.held_dictionary, floors: self.floors }
@@ -184,17 +198,60 @@ const REMOVED: f64 = 0.95;
 const OF_A_MODEL: f64 = 0.05;
 /// Logarithm of what rough numbers may leave more: they fit less of what only this recording has.
 const ABOUT: f64 = 0.4;
+/// Times what is left of what was fitted, from which on what was held out is looked at by itself; noise differs less from run to run.
+const ELSEWHERE: f64 = 1.25;
+/// Times what effects leave of what was fitted, from which on it is told that they leave so much more of what was held out.
+const MORE_THERE: f64 = 3.0;
 /// The library has to reach this share of the ceiling's gain.
 const REACH: f64 = 0.6;
 
-/// Runs the whole analysis.
-///
-/// Where no simulation is given, the robot's own numbers are taken at their word first. If something is left that they and the
-/// library do not explain, they are believed but roughly, if that leaves less: a lab's numbers of a real robot are.
+/// Runs the whole analysis. Where what was fitted agrees and the runs that were held out do not, these are analysed by themselves: a cable may
+/// slip in the last run.
 ///
 /// # Errors
 /// [`AnalysisError`] where there is nothing to compare; everything else ends in a report.
 pub fn analyse(
+    model: &RobotModel,
+    given: &[Given],
+    options: &Options,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Outcome, AnalysisError> {
+    let mut whole = analyse_runs(model, given, options, progress)?;
+    if whole.report.status != Status::NoMismatch || whole.elsewhere < ELSEWHERE || given.len() < 2 {
+        return Ok(whole);
+    }
+    progress("what was held out, by itself");
+    let first = given.len() - held_out_of(given.len());
+    let ids = |given: &[Given]| given.iter().map(|one| one.id.as_str()).collect::<Vec<_>>().join(", ");
+    let (agree, differ) = (ids(&given[..first]), ids(&given[first..]));
+    let told = |message: String| DataQuality::new("runs_differ", Level::Warn, message);
+    // What cannot be analysed by itself leaves the answer of all together.
+    match analyse(model, &given[first..], options, progress) {
+        Ok(mut held) if !matches!(held.report.status, Status::NoMismatch | Status::InsufficientData) => {
+            let of_runs =
+                |quality: &DataQuality| quality.run.as_ref().is_some_and(|id| given[..first].iter().any(|one| one.id == *id));
+            held.report.data_quality.extend(whole.report.data_quality.into_iter().filter(of_runs));
+            held.report.data_quality.push(told(format!("nothing is missing in {agree}; what is said is of {differ}")));
+            let agreeing = whole.report.inputs.runs.into_iter().take(first).map(|run| ToldRun { role: RunRole::Null, ..run });
+            held.report.inputs.runs.splice(0..0, agreeing);
+            Ok(held)
+        }
+        _ => {
+            if whole.elsewhere > MORE_THERE {
+                let message =
+                    format!("{:.1} times as much is left of {differ} as of {agree}, and nothing says why", whole.elsewhere);
+                whole.report.data_quality.push(told(message));
+            }
+            Ok(whole)
+        }
+    }
+}
+
+/// One analysis of runs together.
+///
+/// Where no simulation is given, the robot's own numbers are taken at their word first. If something is left that they and the
+/// library do not explain, they are believed but roughly, if that leaves less: a lab's numbers of a real robot are.
+fn analyse_runs(
     model: &RobotModel,
     given: &[Given],
     options: &Options,
@@ -396,6 +453,7 @@ fn analyse_with(
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
     let beside = verdicts::beside(&problem, &answer.effects, &estimates);
+    let (_, held_windows) = held_out.there(&sized(&answer.effects, &estimates));
     // What the controller acts on is what was logged, but where motors or torques are logged late.
     let late = answer.effects.iter().zip(&estimates).any(|(effect, estimate)| {
         let family = &effect.chosen.candidate.family;
@@ -412,6 +470,7 @@ fn analyse_with(
         held_dictionary: &held_dictionary,
         answer: &answer,
         estimates: &estimates,
+        held_windows: &held_windows,
         ceiling: &ceiling,
         floors: &floors,
         floor_methods: &floor_methods,
@@ -429,7 +488,7 @@ fn analyse_with(
     progress("the corrected model, simulated");
     let judged_s = begun.elapsed().as_secs_f64();
     let again = match &corrected {
-        Some(models) => closed_loop::again((&models.before, &models.after), &found, given, band),
+        Some(models) => closed_loop::again((&models.before, &models.there), &found, given, band),
         None => closed_loop::Again::default(),
     };
     let simulate_s = begun.elapsed().as_secs_f64() - judged_s;
@@ -443,6 +502,10 @@ fn analyse_with(
         .map(|(_, _, after)| crate::nominal::rms(after.into_iter()).max(1e-300).ln())
         .collect();
     outcome.left = crate::nominal::mean(&left);
+    if matches!(prior, Prior::Exact) {
+        outcome.elsewhere = times_more(&problem, &held_problem, &floors);
+    }
+    outcome.report.data_quality.extend(more_there(&found));
     outcome.report.timing.read_s = Some(read_s);
     outcome.report.timing.screen_s = Some(screen_s);
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
@@ -529,7 +592,45 @@ fn split(mut runs: Vec<Both>) -> (Vec<Both>, Vec<Both>) {
         let part = |from: usize, to: usize| (real.slice(from, to), sim.as_ref().map(|sim| sim.slice(from, to)));
         return (vec![part(0, cut)], vec![part((cut + gap).min(real.len() - 1), real.len())]);
     }
-    let out = (runs.len() / 4).max(1);
-    let held = runs.split_off(runs.len() - out);
+    let held = runs.split_off(runs.len() - held_out_of(runs.len()));
     (runs, held)
+}
+
+/// How many of several runs are held out.
+pub(crate) fn held_out_of(runs: usize) -> usize {
+    (runs / 4).max(1)
+}
+
+/// What to know where the effects leave far more of what was held out than of what was fitted, in the channel where that is most.
+fn more_there(found: &Found) -> Option<DataQuality> {
+    let size = |series: Vec<f64>| crate::nominal::rms(series.into_iter());
+    let of_cell = |c: usize| {
+        let (_, _, after) = verdicts::held_out(found, c)?;
+        let fitted = size(verdicts::left(found.problem, c, &sized(&found.answer.effects, found.estimates)));
+        let asked = found.problem.nuisances[c].columns.is_empty();
+        asked.then_some((c, size(after), fitted.max(found.floors[c])))
+    };
+    let all = (0..found.problem.cells.len()).filter_map(of_cell).filter(|(_, there, fitted)| *there > MORE_THERE * fitted);
+    let asked = !found.answer.effects.is_empty() && !found.is_later_part();
+    let (c, there, fitted) = all.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2))).filter(|_| asked)?;
+    let cell = &found.problem.cells[c];
+    let (what, unit) = (verdicts::cell_quantity(found.robot, cell), verdicts::cell_unit(found.robot, cell));
+    let runs: Vec<&str> = found.held.pairs.iter().map(|pair| pair.real.run.id.as_str()).collect();
+    let message = format!(
+        "with this, {what} is off by {fitted:.2e} {unit} RMS in what was fitted and by {there:.2e} in what was held out: something may be \
+         otherwise there; compare {} by itself too",
+        runs.join(", ")
+    );
+    Some(DataQuality::new("runs_differ", Level::Warn, message).value(there, unit))
+}
+
+/// Times more that is left of what was held out than of what was fitted, where that is most; what noise and the model's own error leave counts as left.
+fn times_more(fitted: &Problem, held: &Problem, floors: &[f64]) -> f64 {
+    let size = |problem: &Problem, cell: usize| crate::nominal::rms(problem.cells[cell].residual.iter().copied());
+    let of_cell = |c: usize| {
+        let there = held.cell(fitted.cells[c].channel, fitted.cells[c].index)?;
+        let least = floors[c].max(fitted.practical.any[c]);
+        fitted.nuisances[c].columns.is_empty().then(|| size(held, there) / size(fitted, c).max(least).max(1e-300))
+    };
+    (0..fitted.cells.len()).filter_map(of_cell).fold(0.0, f64::max)
 }

@@ -10,6 +10,7 @@ use simulator::model::RobotModel;
 use crate::analysis::{Found, Given};
 use crate::builtin::{along_commands, along_torque};
 use crate::floors::floor;
+use crate::hypothesis::Windows;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
 use crate::parallel;
@@ -46,8 +47,8 @@ type Play = dyn Fn(&RobotModel, &Recording, f64) -> Result<Recording, String> + 
 /// Told before what was held out begins, s: no sample of it lies at the edge.
 const EARLIER_S: f64 = 0.1;
 
-/// Plays the held-out runs with the model `before` and with `after`, in which the effects are.
-pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[Given], band: Band) -> Again {
+/// Plays the held-out runs with the model without the effects, and each with the one in which they are when they are there.
+pub(crate) fn again(models: (&RobotModel, &[RobotModel]), found: &Found, given: &[Given], band: Band) -> Again {
     let mut out = Again { fits: vec![Vec::new(); found.answer.effects.len()], told: Vec::new() };
     if found.answer.effects.is_empty() || found.held.pairs.iter().any(|pair| pair.real.run.points) {
         return out;
@@ -78,14 +79,17 @@ pub(crate) fn again(models: (&RobotModel, &RobotModel), found: &Found, given: &[
 
 /// One more fit for each effect, where there is one.
 fn add_fits(fits: &mut [Vec<Fit>], found: &Found, fit: &dyn Fn(&Cell) -> Option<Fit>) {
-    for ((effect, estimate), fits) in found.answer.effects.iter().zip(found.estimates).zip(fits) {
+    // Of one that is not there, playing says nothing.
+    let there = |k: &usize| !found.held_windows[*k].as_ref().is_some_and(Windows::is_never);
+    for k in (0..fits.len()).filter(there) {
+        let (effect, estimate) = (&found.answer.effects[k], &found.estimates[k]);
         let cell = main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients);
-        fits.extend(fit(&found.problem.cells[cell]));
+        fits[k].extend(fit(&found.problem.cells[cell]));
     }
 }
 
 fn played(
-    models: (&RobotModel, &RobotModel),
+    models: (&RobotModel, &[RobotModel]),
     found: &Found,
     given: &[Given],
     band: Band,
@@ -93,18 +97,19 @@ fn played(
 ) -> Result<Vec<Played>, String> {
     let first = given.len().saturating_sub(found.held.pairs.len());
     let runs = found.held.pairs.iter().zip(&given[first..]);
-    runs.map(|(pair, given)| {
-        let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
-        let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
-        let (before, after) = parallel::both(|| of(models.0), || of(models.1));
-        let (before, after) = (before?, after?);
-        let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
-        let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);
-        let smooth = |run: Run| Motion::new(run, band);
-        let (real, (before, after)) = parallel::both(|| smooth(real), || parallel::both(|| smooth(before), || smooth(after)));
-        Ok(Played { real, before, after })
-    })
-    .collect()
+    runs.zip(models.1)
+        .map(|((pair, given), after)| {
+            let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
+            let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
+            let (before, after) = parallel::both(|| of(models.0), || of(after));
+            let (before, after) = (before?, after?);
+            let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
+            let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);
+            let smooth = |run: Run| Motion::new(run, band);
+            let (real, (before, after)) = parallel::both(|| smooth(real), || parallel::both(|| smooth(before), || smooth(after)));
+            Ok(Played { real, before, after })
+        })
+        .collect()
 }
 
 fn run_of(sim: &Recording, robot: &Robot) -> Result<Run, String> {

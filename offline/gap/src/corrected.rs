@@ -12,7 +12,9 @@ use nalgebra::Vector3;
 
 use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
-use crate::hypothesis::{AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, SENSOR, TOOL_LENGTH, TOOL_TWIST, direction};
+use crate::hypothesis::{
+    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, Window, direction,
+};
 use crate::intervals::Estimate;
 use crate::known;
 use crate::motion::{Band, Motion};
@@ -24,6 +26,8 @@ pub(crate) struct Corrected {
     pub(crate) before: RobotModel,
     /// The same with the effects that were found.
     pub(crate) after: RobotModel,
+    /// The same for each run that was held out, with the effects when they are there, if they are.
+    pub(crate) there: Vec<RobotModel>,
     /// Effects that no simulator can be given, each with the reason.
     pub(crate) left_out: Vec<String>,
 }
@@ -43,20 +47,22 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         believe(&mut before, found);
         before.model_error = known::model_error(&before, found.robot, runs, band);
     }
-    let mut after = before.clone();
-    let mut left_out = Vec::new();
+    let (mut after, mut left_out) = (before.clone(), Vec::new());
+    let mut there = vec![before.clone(); found.held.pairs.len()];
     let told = |candidate: &Candidate, why: &str| format!("{}: {why}", named(found, candidate));
-    for (effect, estimate) in found.answer.effects.iter().zip(found.estimates) {
+    for (k, (effect, estimate)) in found.answer.effects.iter().zip(found.estimates).enumerate() {
         let candidate = &effect.chosen.candidate;
-        let put = as_effect(found, candidate, estimate).and_then(|(effect, sign)| {
-            let mut with = after.clone();
+        let window = last_window(found, k);
+        let put = |model: &RobotModel, window: Window| {
+            let (effect, sign) = as_effect(found, candidate, estimate, window)?;
+            let mut with = model.clone();
             if !merged(&mut with, &effect, sign) {
                 if sign < 0.0 {
-                    return Err("there is less of it than none".to_owned());
+                    return Err::<_, String>("there is less of it than none".to_owned());
                 }
                 with.effects_mut().push(effect);
             }
-            if let Some(constant) = constant_of(&before, candidate, estimate)
+            if let Some(constant) = constant_of(&before, candidate, estimate, window)
                 && !merged(&mut with, &constant, 1.0)
             {
                 with.effects_mut().push(constant);
@@ -66,10 +72,22 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
             stays(&with, &runs[0].real)?;
             RobotModel::from_toml(&with.to_toml(), None).map_err(|error| error.to_string())?;
             Ok(with)
-        });
-        match put {
+        };
+        match put(&after, window) {
             Ok(with) => {
+                for (run, model) in there.iter_mut().enumerate() {
+                    let own = if found.is_later_part() { window } else { found.window_there(k, run) };
+                    *model = match own {
+                        NEVER => continue,
+                        _ if own == window && *model == after => with.clone(),
+                        // What can be put into one can be put into all.
+                        _ => put(model, own).unwrap_or_else(|_| model.clone()),
+                    };
+                }
                 after = with;
+                if !found.is_later_part() && windows(found, k).any(|other| other != window) {
+                    left_out.push(told(candidate, "when it is there in other runs than the last one where it is"));
+                }
                 if candidate.family.physics == "link_geometry" && candidate.family.form.ends_with(", torque too") {
                     left_out.push(told(candidate, "the torque that its weight asks for then is not a term of the simulator"));
                 }
@@ -84,7 +102,23 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         }
     }
     after.set_name(&format!("{} corrected", given.name()));
-    Corrected { before, after, left_out }
+    Corrected { before, after, there, left_out }
+}
+
+/// When an effect is there, run by run.
+fn windows(found: &Found, effect: usize) -> impl DoubleEndedIterator<Item = Window> {
+    let fitted = (0..found.problem.pairs.len()).map(move |run| found.answer.effects[effect].chosen.candidate.window_of(run));
+    fitted.chain((0..found.held.pairs.len()).map(move |run| found.window_there(effect, run)))
+}
+
+/// When it is there in the last run that has it; in the only one, from when it begins where it was fitted to when it ends in the rest.
+fn last_window(found: &Found, effect: usize) -> Window {
+    if found.is_later_part() {
+        let ([from, to], there) = (found.answer.effects[effect].chosen.candidate.window_of(0), found.window_there(effect, 0));
+        let ends = to.min(found.held.pairs[0].real.run.elapsed_s(0));
+        return [from, if there == NEVER { ends } else { there[1] }];
+    }
+    windows(found, effect).rev().find(|window| *window != NEVER).unwrap_or(ALWAYS)
 }
 
 /// Largest number in any unit that a robot's simulation may reach.
@@ -151,7 +185,7 @@ fn named(found: &Found, candidate: &Candidate) -> String {
 
 /// The offset of the joint that goes with a ratio or a coupling, which is right elsewhere than where the simulator has it: a ratio where
 /// the joint was homed, a coupling at zero.
-fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate) -> Option<Effect> {
+fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate, window: Window) -> Option<Effect> {
     let (family, theta) = (&candidate.family, &estimate.coefficients);
     let constant = match (family.physics, family.form) {
         ("transmission_ratio", _) => {
@@ -165,17 +199,14 @@ fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate) -
         return None;
     }
     let physics = Physics::JointOffset(JointOffset { o: constant });
-    let mut effect = windowed(Effect::new(physics, Bound::Joint(*family.joints.first()?)), estimate);
+    let mut effect = windowed(Effect::new(physics, Bound::Joint(*family.joints.first()?)), window);
     effect.source = Some(format!("ravenpose gap (constant of {} {})", family.physics, family.form));
     Some(effect)
 }
 
-/// The effect in the window that was found.
-fn windowed(mut effect: Effect, estimate: &Estimate) -> Effect {
-    if let Some([from, to]) = estimate.window {
-        effect.from_s = from.map_or(f64::NEG_INFINITY, |(t, _)| t);
-        effect.to_s = to.map_or(f64::INFINITY, |(t, _)| t);
-    }
+/// The effect in a window.
+fn windowed(mut effect: Effect, [from_s, to_s]: Window) -> Effect {
+    (effect.from_s, effect.to_s) = (from_s, to_s);
     effect
 }
 
@@ -217,7 +248,7 @@ fn believe(model: &mut RobotModel, found: &Found) {
 }
 
 /// One effect for the simulator, and -1 where it is to be taken off; the reason where it has no such term.
-fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Result<(Effect, f64), String> {
+fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate, window: Window) -> Result<(Effect, f64), String> {
     let family = &candidate.family;
     let joint = family.joints.first().copied();
     let numbers: Vec<(&str, f64)> = estimate.parameters.iter().map(|(named, _)| (named.name, named.value)).collect();
@@ -294,7 +325,7 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Resul
     }
     let sign = less(name, &mut parameters);
     let physics = Physics::new(name, &parameters).ok_or("the simulator does not know it")?.map_err(|error| error.to_string())?;
-    let mut effect = windowed(Effect::new(physics, bound), estimate);
+    let mut effect = windowed(Effect::new(physics, bound), window);
     let told = if name == family.physics { family.form.to_owned() } else { format!("{} {}", family.physics, family.form) };
     effect.source = Some(format!("ravenpose gap ({told})"));
     Ok((effect, sign))

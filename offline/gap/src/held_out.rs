@@ -1,12 +1,13 @@
-//! What effects leave of what was held out, where nothing was fitted; and which of them do not hold there. What was fitted says how well a
+//! What effects leave of what was held out, where no size was fitted; and which of them do not hold there. What was fitted says how well a
 //! claim fits, and its blocks how well it predicts their neighbours: a wrong one, bent to what is there, may do both. Nor does hold what is
 //! said beside a larger effect and may by its own interval be nothing.
 
-use crate::hypothesis::{Candidate, Dictionary, UNMODELLED};
+use crate::held_windows;
+use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
 use crate::nominal::{less_means, mean};
 use crate::problem::Problem;
-use crate::search::{Answer, Effect, Scored, Thresholds};
+use crate::search::{Answer, Effect, Scored, Thresholds, complexity};
 use crate::verdicts::{left, main_cell};
 
 /// Of the squared size of an effect, what it has to leave less of what was held out at least: 1 where it is as it was fitted, -1 where it has
@@ -16,9 +17,16 @@ const HOLDS: f64 = -0.2;
 /// in most of what they are fitted to.
 const HOLDS_BARELY: f64 = 0.0;
 const BARELY: f64 = 3.0;
+/// Times the noise that an effect has to be large where it is, if it is in no run that was held out.
+const STANDS_OUT: f64 = 1.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.
 const INSTEAD: f64 = 0.5;
 const NEAR: f64 = 0.3;
+/// What an effect has to leave there above the noise, in squares of that, for a simpler rival to be asked for; the share of its score that the
+/// rival has to have, and what that may leave of it.
+const MUCH: f64 = 3.0;
+const CLOSE: f64 = 0.95;
+const FAR_LESS: f64 = 0.25;
 /// Share of what the largest effect explains from which on another one is something, whatever its own number says; and how often a rival may be
 /// taken for what says it.
 const LARGE: f64 = 0.1;
@@ -146,14 +154,14 @@ impl HeldOut<'_> {
             }
         }
         if self.holds(answer, all, k, thresholds) {
-            return None;
+            return self.plainer_there(answer, all, k).filter(|_| anew).map(Fate::Otherwise);
         }
         let exchanged = if answer.effects[k].second { None } else { rival() };
         Some(exchanged.map_or(Fate::Refused, Fate::Exchanged))
     }
 
     /// Is what was held out a later part of the only run?
-    fn is_later_part(&self) -> bool {
+    pub(crate) fn is_later_part(&self) -> bool {
         let id = |problem: &Problem| problem.pairs[0].real.run.id.clone();
         id(self.problem) == id(self.dictionary.problem)
     }
@@ -167,12 +175,40 @@ impl HeldOut<'_> {
             return true;
         }
         let cell = main_cell(self.floors, claim, coefficients);
+        if self.is_absent(all, k) {
+            // In one run and not in the others is what stands out there, and is not what a larger effect leaves.
+            return !barely && is_large(answer, k) && claim.rms_where_it_is(cell, coefficients) > STANDS_OUT * self.floors[cell];
+        }
         let Some((without, with, own)) = self.without_and_with(all, k, all[k], cell) else { return true };
         if own <= SHOWS * claim.rms(cell, coefficients).powi(2) {
             // It does not show there, or is a constant that each run has of its own.
             return !barely || self.problem.nuisances[cell].of_run.contains(&true);
         }
         if barely { without - with > HOLDS_BARELY * own } else { without - with >= HOLDS * own }
+    }
+
+    /// The first simpler rival that scores about as well, and of what was held out leaves far less above the noise where the effect leaves much.
+    fn plainer_there(&self, answer: &Answer, all: &[Sized], k: usize) -> Option<usize> {
+        let effect = &answer.effects[k];
+        let cell = main_cell(self.floors, all[k].0, all[k].1);
+        let noise = self.floors[cell].powi(2);
+        let above = |claim: Sized| self.without_and_with(all, k, claim, cell).map(|(_, with, _)| with - noise);
+        let own = above(all[k]).filter(|own| *own > MUCH * noise)?;
+        let is_close = |rival: &Scored| {
+            rival.candidate.family.physics != UNMODELLED
+                && rival.score >= CLOSE * effect.chosen.score
+                && complexity(&rival.candidate) < complexity(&effect.chosen.candidate)
+                && !all.iter().any(|(other, _)| other.same_claim(&rival.candidate))
+        };
+        let leaves_little =
+            |rival: &Scored| above((&rival.candidate, &rival.coefficients)).is_some_and(|left| left <= FAR_LESS * own);
+        effect.rivals.iter().position(|rival| is_close(rival) && leaves_little(rival))
+    }
+
+    /// Is an effect not there in any run that was held out?
+    fn is_absent(&self, all: &[Sized], k: usize) -> bool {
+        let (_, windows) = self.there(all);
+        windows[k].as_ref().is_some_and(Windows::is_never)
     }
 
     /// The first rival of an effect that holds in its place.
@@ -207,20 +243,39 @@ impl HeldOut<'_> {
         let others = others(all, k);
         let with: Vec<Sized> = others.iter().copied().chain([claim]).collect();
         let roughly = self.problem.nuisances[cell].estimate(&left(self.problem, cell, &with));
-        let (_, _, without) = self.corrected(&others, &roughly, cell)?;
-        let (c, _, with) = self.corrected(&with, &roughly, cell)?;
+        // The others are there when they are beside it: what they leave without it is its own.
+        let (there, _) = self.there(&with);
+        let (_, _, without) = self.less(&there[..others.len()], &others, &roughly, cell)?;
+        let (c, _, with) = self.less(&there, &with, &roughly, cell)?;
         Some((c, without, with))
+    }
+
+    /// Some effects as they are in what was held out, and when each is there.
+    pub(crate) fn there(&self, effects: &[Sized]) -> (Vec<Candidate>, Vec<Option<Windows>>) {
+        let held = self.dictionary.problem;
+        let whole: Vec<(Candidate, &[f64])> =
+            effects.iter().map(|(own, theta)| (Candidate::new(self.dictionary, &own.family, &own.shape, None), *theta)).collect();
+        let fitted: Vec<Option<Windows>> = effects.iter().map(|(own, _)| own.windows.clone()).collect();
+        let windows = held_windows::windows(held, &held_windows::floors(self.problem, self.floors, held), &whole, &fitted);
+        let within = |((whole, _), windows): (&(Candidate, _), &Option<Windows>)| {
+            windows.as_ref().map_or_else(|| whole.clone(), |windows| whole.within(held, windows))
+        };
+        (whole.iter().zip(&windows).map(within).collect(), windows)
     }
 
     /// Residuals of a cell of what was held out, before and after the correction by some effects, beside the likeliest values of what is known
     /// only roughly; with the cell's number there.
     pub(crate) fn corrected(&self, effects: &[Sized], beside: &[f64], cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
+        self.less(&self.there(effects).0, effects, beside, cell)
+    }
+
+    /// The same of effects as they are there.
+    fn less(&self, there: &[Candidate], effects: &[Sized], beside: &[f64], cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
         let (of, held) = (&self.problem.cells[cell], self.dictionary.problem);
         let c = held.cell(of.channel, of.index)?;
         let before = held.cells[c].residual.clone();
         let mut after = before.clone();
-        for (own, coefficients) in effects {
-            let there = Candidate::new(self.dictionary, &own.family, &own.shape, own.window);
+        for (there, (_, coefficients)) in there.iter().zip(effects) {
             there.take_off(c, coefficients, &mut after);
         }
         let nuisance = &held.nuisances[c];

@@ -1,18 +1,16 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{
-    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, START, STRIBECK_RANGE, Window, rounds,
-};
+use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, START, STRIBECK_RANGE, rounds};
 use crate::nominal::{Nominal, rms};
 use crate::parallel;
 use crate::parameters::{Named, parameters};
 use crate::refine;
 use crate::robot::Robot;
-use crate::score::Scorer;
+use crate::score::{Grams, Scorer};
 use crate::search::{Effect, score_scale};
 
-/// Parameters and window as one replicate has them.
-type Replicate = (Vec<Named>, Window);
+/// Parameters as one replicate has them.
+type Replicate = Vec<Named>;
 
 /// An instant, s from the start of each run, with its 95 % interval.
 pub type Edge = (f64, [f64; 2]);
@@ -22,8 +20,9 @@ pub type Edge = (f64, [f64; 2]);
 pub struct Estimate {
     /// Parameters, with their 95 % intervals.
     pub parameters: Vec<(Named, [f64; 2])>,
-    /// Beginning and end, s from the start of each run, with their intervals; none where it does not begin or end in it.
-    pub window: Option<[Option<Edge>; 2]>,
+    /// Beginning and end, s from the start of each run, with their intervals, none where it does not begin or end in it; once where all runs are
+    /// alike, and nothing where it is always there.
+    pub windows: Vec<[Option<Edge>; 2]>,
     /// Coefficients of the candidate's columns.
     pub coefficients: Vec<f64>,
 }
@@ -45,11 +44,6 @@ impl Estimate {
         let hold = |own: &mut [f64; 2], other: &[f64; 2]| *own = [own[0].min(other[0]), own[1].max(other[1])];
         for (named, interval) in &mut self.parameters {
             if let Some((_, beside)) = other.parameters.iter().find(|(beside, _)| beside.name == named.name) {
-                hold(interval, beside);
-            }
-        }
-        for (edge, beside) in self.window.iter_mut().flatten().zip(other.window.iter().flatten()) {
-            if let (Some((_, interval)), Some((_, beside))) = (edge, beside) {
                 hold(interval, beside);
             }
         }
@@ -173,7 +167,7 @@ fn errors_of_all(numbers: usize) -> f64 {
 #[derive(Debug, Clone, Copy)]
 enum Slope {
     Shape(usize),
-    Edge(usize),
+    Edge,
 }
 
 /// Estimates of all effects together. Where a choice of an effect's shape is not decided, the intervals hold what either would say.
@@ -181,6 +175,7 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
     let candidates: Vec<&Candidate> = effects.iter().map(|e| &e.chosen.candidate).collect();
     let mut all = of_candidates(dictionary, scorer, nominal, robot, &candidates);
     for (k, estimate) in all.iter_mut().enumerate() {
+        estimate.windows = edges(dictionary, scorer, &candidates, (k, effects[k].chosen.score));
         for other in chosen_as_well(dictionary, scorer, &candidates, (k, effects[k].chosen.score)) {
             let mut with = candidates.clone();
             with[k] = &other;
@@ -190,13 +185,59 @@ pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, ro
     all
 }
 
+/// An edge is known to the smoothing at best, s; no further is looked for it than so far.
+const EDGE_S: f64 = 0.02;
+const FURTHEST_S: f64 = 10.0;
+/// Times that the end of its interval is halved.
+const HALVED: usize = 4;
+
+/// The edges of a candidate's windows among others, each as far as it may lie without fitting much worse: while an arm stands still, nothing says
+/// when a weight was picked up.
+fn edges(dictionary: &Dictionary, scorer: &Scorer, candidates: &[&Candidate], (k, score): (usize, f64)) -> Vec<[Option<Edge>; 2]> {
+    let Some(windows) = &candidates[k].windows else { return Vec::new() };
+    let base = others_of(scorer, candidates, k);
+    let whole = Candidate::new(dictionary, &candidates[k].family, &candidates[k].shape, None);
+    let least = scorer.fitted(&base, candidates[k]).0;
+    let of_edge = |(place, edge): (usize, usize)| {
+        let fits = |by_s: f64| {
+            let moved = windows.moved((place, edge), by_s);
+            let [from, to] = moved.all()[place];
+            let there = whole.within(dictionary.problem, &moved);
+            from < to && there.shows() && scorer.fitted(&base, &there).0 < least + UNDECIDED * score_scale(score)
+        };
+        let reach = |sign: f64| {
+            let mut known = EDGE_S;
+            while known < FURTHEST_S && fits(2.0 * sign * known) {
+                known *= 2.0;
+            }
+            let mut step = 0.5 * known;
+            for _ in 0..HALVED {
+                if fits(sign * (known + step)) {
+                    known += step;
+                }
+                step *= 0.5;
+            }
+            known
+        };
+        let t = windows.all()[place][edge];
+        (t, [(t - reach(-1.0)).max(0.0), t + reach(1.0)])
+    };
+    let of_place = |place: usize| [0, 1].map(|edge| windows.all()[place][edge].is_finite().then(|| of_edge((place, edge))));
+    parallel::map((0..windows.all().len()).collect::<Vec<_>>(), of_place)
+}
+
+/// What there is beside one of some candidates.
+fn others_of(scorer: &Scorer, candidates: &[&Candidate], k: usize) -> Grams {
+    let others = candidates.iter().enumerate().filter(|(i, _)| *i != k);
+    others.fold(scorer.empty(), |grams, (_, other)| scorer.extended(&grams, &other.columns))
+}
+
 /// A candidate among others with its other choices, where these do not fit much worse.
 fn chosen_as_well(dictionary: &Dictionary, scorer: &Scorer, candidates: &[&Candidate], (k, score): (usize, f64)) -> Vec<Candidate> {
     if candidates[k].family.choices.is_empty() {
         return Vec::new();
     }
-    let others = candidates.iter().enumerate().filter(|(i, _)| *i != k);
-    let base = others.fold(scorer.empty(), |grams, (_, other)| scorer.extended(&grams, &other.columns));
+    let base = others_of(scorer, candidates, k);
     let fitted = |candidate: &Candidate| scorer.fitted(&base, candidate);
     let least = fitted(candidates[k]).0;
     if !least.is_finite() {
@@ -215,7 +256,7 @@ fn of_candidates(
     robot: &Robot,
     candidates: &[&Candidate],
 ) -> Vec<Estimate> {
-    // First round: coefficients; second: with the slopes by shape and window.
+    // First round: coefficients; second: with the slopes by shape and windows.
     let plain = candidates.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
     let fit = scorer.fit(&plain);
     let mut grams = scorer.empty();
@@ -238,23 +279,23 @@ fn of_candidates(
         .iter()
         .zip(layout)
         .map(|(candidate, (column, theta, which))| {
-            let of = |coefficients: &[f64]| -> (Vec<Named>, Window) {
+            let of = |coefficients: &[f64]| -> Replicate {
                 let own = &coefficients[column..column + theta.len()];
                 let mut shape = candidate.shape.clone();
-                let mut window = candidate.window.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 for (k, which) in which.iter().enumerate() {
                     let moved = coefficients[column + theta.len() + k] - wide.coefficients[column + theta.len() + k];
                     match which {
                         Slope::Shape(number) => shape[*number] += moved,
-                        Slope::Edge(edge) => window[*edge] += moved,
+                        // Its own interval is asked of the fit itself.
+                        Slope::Edge => {}
                     }
                 }
                 // Deviations are taken from the wide fit, values from the plain one.
                 let at: Vec<f64> = own.iter().zip(&wide.coefficients[column..]).zip(&theta).map(|((x, w), t)| t + x - w).collect();
-                (parameters(robot, nominal, candidate, &at, &shape), window)
+                parameters(robot, nominal, candidate, &at, &shape)
             };
-            let (values, _) = of(&wide.coefficients);
-            let replicates: Vec<(Vec<Named>, Window)> = wide.without.iter().map(|c| of(c)).collect();
+            let values = of(&wide.coefficients);
+            let replicates: Vec<Replicate> = wide.without.iter().map(|c| of(c)).collect();
             let spread = |of: &dyn Fn(&Replicate) -> f64| -> f64 {
                 let mean = replicates.iter().map(of).sum::<f64>() / blocks;
                 replicates.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>().sqrt()
@@ -266,7 +307,7 @@ fn of_candidates(
                 .map(|(k, named)| {
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
-                    let half = (reach * spread(&|r| r.0[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
+                    let half = (reach * spread(&|r| r[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
                     let [least, most] = possible(physics, form, named.name);
                     (
                         named.clone(),
@@ -274,35 +315,23 @@ fn of_candidates(
                     )
                 })
                 .collect();
-            let window = candidate.window.map(|window| {
-                [0, 1].map(|edge| {
-                    let t = window[edge];
-                    // An edge is known to the smoothing at best.
-                    let half = (reach(1) * spread(&|r| r.1[edge])).max(0.02);
-                    t.is_finite().then_some((t, [t - half, t + half]))
-                })
-            });
-            Estimate { parameters, window, coefficients: theta }
+            Estimate { parameters, windows: Vec::new(), coefficients: theta }
         })
         .collect()
 }
 
-/// Change of the effect per unit of each refined number of its shape, and of each edge of its window.
+/// Change of the effect per unit of each refined number of its shape, and of each edge of its windows.
 fn slopes(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64]) -> Vec<(Slope, Column)> {
     let family = &candidate.family;
     // What rounds a sign or a crossing is not asked for.
     let asked: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some() && !rounds(family.shape[*k])).collect();
     let of_numbers = slopes_of(dictionary, candidate, theta, &asked);
     let mut all: Vec<(Slope, Column)> = asked.into_iter().map(Slope::Shape).zip(of_numbers).collect();
-    for edge in 0..2 {
-        let Some(window) = candidate.window.filter(|window| window[edge].is_finite()) else { continue };
+    let windows = candidate.windows.as_ref();
+    for (windows, edge) in windows.into_iter().flat_map(|windows| windows.edges().into_iter().map(move |edge| (windows, edge))) {
         let step = 0.04;
-        let at = |sign: f64| {
-            let mut moved = window;
-            moved[edge] += sign * step;
-            Candidate::new(dictionary, family, &candidate.shape, Some(moved))
-        };
-        all.push((Slope::Edge(edge), difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
+        let at = |sign: f64| Candidate::new(dictionary, family, &candidate.shape, Some(&windows.moved(edge, sign * step)));
+        all.push((Slope::Edge, difference(&at(1.0), &at(-1.0), theta, 2.0 * step)));
     }
     all.retain(|(_, column)| !column.is_empty());
     all
@@ -330,7 +359,7 @@ fn slope(dictionary: &Dictionary, candidate: &Candidate, theta: &[f64], numbers:
         for k in numbers {
             shape[*k] += sign * step;
         }
-        Candidate::new(dictionary, family, &shape, candidate.window)
+        Candidate::new(dictionary, family, &shape, candidate.windows.as_ref())
     };
     let (there, here) = parallel::both(|| at(1.0), || at(-1.0));
     difference(&there, &here, theta, 2.0 * step)

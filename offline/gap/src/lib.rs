@@ -33,6 +33,7 @@ mod experiment;
 pub mod floors;
 mod gates;
 pub mod held_out;
+mod held_windows;
 mod known;
 pub mod needed;
 pub mod parallel;

@@ -91,7 +91,7 @@ fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, 
     let motion = |r: usize| &problem.pairs[r].real;
     let unit = robot.position_unit(joint);
     let name = &robot.joints[joint];
-    if candidate.window.is_some() {
+    if candidate.windows.is_some() {
         return (Quantity::new("Time", "s"), at(&|r, i| motion(r).run.time_s(i)));
     }
     match family.physics {

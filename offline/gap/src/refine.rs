@@ -31,7 +31,7 @@ pub fn starts(dictionary: &Dictionary, families: &[Arc<Family>]) -> Vec<Candidat
 /// Misfit of a candidate and its coefficients; infinite where they may not be.
 pub type Fitted<'a> = dyn Fn(&Candidate) -> (f64, Vec<f64>) + Sync + 'a;
 
-/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least, and with the choice
+/// The candidate with its refinable numbers, and the edges of its windows, moved to where the misfit is least, and with the choice
 /// that is best then.
 pub fn refined(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
     let mut best = settled(dictionary, start, fitted);
@@ -56,14 +56,14 @@ pub fn chosen_otherwise(dictionary: &Dictionary, of: &Candidate, fitted: &Fitted
     let with = |k: usize, value: f64| {
         let mut shape = of.shape.clone();
         shape[k] = value;
-        Candidate::new(dictionary, family, &shape, of.window)
+        Candidate::new(dictionary, family, &shape, of.windows.as_ref())
     };
     let all = family.choices.iter().flat_map(|&k| family.other_choices(k, of.shape[k]).into_iter().map(move |value| (k, value)));
     let starts: Vec<Candidate> = all.map(|(k, value)| with(k, value)).filter(Candidate::shows).collect();
     parallel::map(starts, |start| settled(dictionary, &start, fitted))
 }
 
-/// The candidate with its refinable numbers, and the edges of its window, moved to where the misfit is least.
+/// The candidate with its refinable numbers, and the edges of its windows, moved to where the misfit is least.
 fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candidate {
     let misfit = &|candidate: &Candidate| fitted(candidate).0;
     let family = &start.family;
@@ -72,7 +72,7 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
     if family.secant {
         for _ in 0..SECANTS {
             let shape = fitted(&best).1[..family.shape.len()].to_vec();
-            best = Candidate::new(dictionary, family, &shape, best.window);
+            best = Candidate::new(dictionary, family, &shape, best.windows.as_ref());
         }
         least = misfit(&best);
     }
@@ -106,7 +106,7 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
                     if let Some(carry) = &family.carry {
                         carry(&best.shape, &mut shape);
                     }
-                    try_one(Candidate::new(dictionary, family, &shape, best.window), &mut best, &mut least, misfit);
+                    try_one(Candidate::new(dictionary, family, &shape, best.windows.as_ref()), &mut best, &mut least, misfit);
                 }
                 step *= 0.5;
             }
@@ -119,20 +119,20 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
     best
 }
 
-/// The edges of a window moved to where the misfit is least.
+/// The edges of windows moved to where the misfit is least.
 pub fn edges_moved(dictionary: &Dictionary, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {
     // The shape stays, and what it costs to make is paid once.
     let mut whole: Option<Candidate> = None;
-    for edge in 0..2 {
-        let Some(window) = best.window.filter(|window| window[edge].is_finite()) else { continue };
+    let Some(windows) = best.windows.clone() else { return };
+    for (place, edge) in windows.edges() {
         let whole = whole.get_or_insert_with(|| Candidate::new(dictionary, &best.family, &best.shape, None));
-        let mut step = EDGE_S * window[edge].clamp(1.0, 8.0);
+        let mut step = EDGE_S * windows.all()[place][edge].clamp(1.0, 8.0);
         for _ in 0..HALVINGS + 2 {
             for sign in [-1.0, 1.0] {
-                let mut moved = best.window.unwrap_or(window);
-                moved[edge] += sign * step;
-                if moved[0] < moved[1] && moved[edge] > 0.0 {
-                    try_one(whole.within(dictionary.problem, moved), best, least, misfit);
+                let Some(moved) = best.windows.as_ref().map(|windows| windows.moved((place, edge), sign * step)) else { return };
+                let there = moved.all()[place];
+                if there[0] < there[1] && there[edge] > 0.0 {
+                    try_one(whole.within(dictionary.problem, &moved), best, least, misfit);
                 }
             }
             step *= 0.5;

@@ -6,7 +6,7 @@ use gap_report::Region;
 
 use crate::analysis::Found;
 use crate::held_out::{others, sized};
-use crate::hypothesis::Window;
+use crate::hypothesis::{ALWAYS, Windows};
 use crate::problem::Problem;
 
 /// Share of the rows that each step takes off one side, and how much may be explained in them, of what is explained in as many on average:
@@ -103,12 +103,13 @@ fn places(problem: &Problem, space: &Space, rows: &[(usize, usize)]) -> Vec<Vec<
         .collect()
 }
 
-/// What an effect explains of a residual beside the others, at the rows within its window.
-fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f64], window: Option<Window>) -> Option<Rows> {
+/// What an effect explains of a residual beside the others, at the rows within its windows.
+fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f64], windows: Option<&Windows>) -> Option<Rows> {
     let all = &problem.cells[cell].rows;
     let within = |&(r, i): &(usize, usize)| {
         let time_s = problem.pairs[r].real.run.elapsed_s(i);
-        window.is_none_or(|[from, to]| (from..=to).contains(&time_s))
+        let [from, to] = windows.map_or(ALWAYS, |windows| windows.of(r));
+        (from..=to).contains(&time_s)
     };
     let kept: Vec<usize> = (0..all.len()).filter(|k| within(&all[*k]) && k < &own.len()).collect();
     let explained: Vec<f64> = kept.iter().map(|k| without[*k].powi(2) - (without[*k] - own[*k]).powi(2)).collect();
@@ -121,14 +122,14 @@ fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Ro
     let without = crate::verdicts::left(found.problem, cell, &others);
     let candidate = &found.answer.effects[effect].chosen.candidate;
     let own = candidate.effect(cell, &found.estimates[effect].coefficients);
-    rows(found.problem, cell, space, &without, &own, candidate.window)
+    rows(found.problem, cell, space, &without, &own, candidate.windows.as_ref())
 }
 
 fn held_out(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
     let all = sized(&found.answer.effects, found.estimates);
     let (c, without, with) = found.held_out().beside(&all, effect, all[effect], cell)?;
     let own: Vec<f64> = without.iter().zip(&with).map(|(without, with)| without - with).collect();
-    rows(found.held, c, space, &without, &own, found.answer.effects[effect].chosen.candidate.window)
+    rows(found.held, c, space, &without, &own, found.held_windows[effect].as_ref())
 }
 
 /// The same, with how far the motion went where there is no limit.

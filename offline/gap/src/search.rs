@@ -1,6 +1,7 @@
 //! Which candidates explain the residuals: forward, then swap and drop (gap-design.md, section 7).
 
 mod at_once;
+mod by_run;
 mod likeliest;
 
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::sync::Arc;
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
-use crate::hypothesis::{Candidate, Dictionary, Family, HARDENING, STEPS_IN_TIME, UNMODELLED, WALL, Window, library, rounds};
+use crate::hypothesis::{Candidate, Dictionary, Family, UNMODELLED, WALL, Windows, library, rounds};
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::{Channel, Problem};
@@ -38,10 +39,6 @@ impl Default for Thresholds {
     }
 }
 
-/// Steps of the grid of windows in a run.
-const EDGES: usize = 12;
-/// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
-const ALWAYS: [&str; 1] = ["stribeck_friction"];
 /// What a delay in a window pays more than others, nats: a little lateness passes for the last of what a motion's middle leaves.
 const LATE_IN_A_WINDOW: f64 = 25.0;
 /// Times its standard error over the blocks that the gain of an effect has to reach, or the ranks of the blocks theirs, which the largest
@@ -459,9 +456,9 @@ impl Search<'_, '_> {
                 worth.push(scored.clone());
             }
         }
-        worth.retain(|s| comes_and_goes(&s.candidate.family));
+        worth.retain(|s| s.candidate.family.comes_and_goes());
         claims.extend(best_claims(worth.len() * windows.len(), &|k| {
-            let candidate = worth[k / windows.len()].candidate.within(self.problem, windows[k % windows.len()]);
+            let candidate = worth[k / windows.len()].candidate.within(self.problem, &windows[k % windows.len()]);
             if candidate.shows() { self.score(grams, &base, &candidate) } else { None }
         }));
         sort(&mut claims);
@@ -470,7 +467,10 @@ impl Search<'_, '_> {
         let best = claims.first().map_or(0.0, |s| s.score);
         let worth = claims.iter_mut().enumerate().filter(|(k, s)| *k < if s.candidate.edges() > 0 { 12 } else { 6 });
         let worth: Vec<_> = worth.filter(|(_, s)| s.score > 3.0 && s.score > 0.1 * best).collect();
-        let _ = parallel::map(worth, |(_, scored)| self.settle_shape(grams, &base, scored));
+        let _ = parallel::map(worth, |(_, scored)| {
+            self.run_by_run(grams, &base, scored);
+            self.settle_shape(grams, &base, scored);
+        });
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
@@ -514,10 +514,10 @@ impl Search<'_, '_> {
     /// that fits the whole of the runs best, and some are not tried in windows of their own.
     fn in_the_window_of_the_first(&self, claims: &[Scored], grams: &Grams, base: &Fit) -> Vec<Scored> {
         let best = claims.first().filter(|best| best.score > self.thresholds.nats);
-        let Some((best, window)) = best.and_then(|best| Some((best, best.candidate.window?))) else { return Vec::new() };
+        let Some((best, windows)) = best.and_then(|best| Some((best, best.candidate.windows.clone()?))) else { return Vec::new() };
         let mut forms = best_of(self.candidates.len(), Candidate::same_form, &|k| {
-            let candidate = self.candidates[k].within(self.problem, window);
-            if candidate.shows() && may_have_edges(&candidate.family) { self.score(grams, base, &candidate) } else { None }
+            let candidate = self.candidates[k].within(self.problem, &windows);
+            if candidate.shows() && candidate.family.may_have_edges() { self.score(grams, base, &candidate) } else { None }
         });
         sort(&mut forms);
         let mut forms = distinct_by(&forms, Candidate::same_form);
@@ -553,7 +553,7 @@ impl Search<'_, '_> {
                 }
                 // Many starts differ in nothing but the rounding.
                 if !starts.iter().any(|other| other.same_form(start) && other.shape == shape) {
-                    starts.push(Candidate::new(self.dictionary, &start.family, &shape, rival.candidate.window));
+                    starts.push(Candidate::new(self.dictionary, &start.family, &shape, rival.candidate.windows.as_ref()));
                 }
             }
             let scored = starts.iter().filter(|start| start.shows()).filter_map(|start| self.score(grams, base, start));
@@ -604,15 +604,6 @@ impl Search<'_, '_> {
         sort(&mut claims[..close]);
     }
 
-    /// Windows to begin with: a beginning, an end, or both.
-    fn windows(&self) -> Vec<Window> {
-        let shortest = self.problem.pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
-        let at = |k: usize| shortest * k as f64 / EDGES as f64;
-        let ends = (1..EDGES).flat_map(|k| [[at(k), f64::INFINITY], [f64::NEG_INFINITY, at(k)]]);
-        let both = (1..EDGES - 2).step_by(2).flat_map(|i| (i + 2..EDGES).step_by(2).map(move |j| [at(i), at(j)]));
-        ends.chain(both).collect()
-    }
-
     /// Is a candidate as large as it has to be, and does its first part say no less than half of what the whole says?
     fn is_borne_out(&self, grams: &Grams, Scored { candidate, coefficients, .. }: &Scored) -> bool {
         if candidate.apart.is_empty() {
@@ -660,7 +651,7 @@ fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
     let has_level = |candidate: &Candidate| {
         matches!(candidate.family.physics, "coulomb_friction" | "stribeck_friction") || candidate.is_by_load_and_level()
     };
-    one.window == other.window && one.family.joints == other.family.joints && has_level(one) && has_level(other)
+    one.windows == other.windows && one.family.joints == other.family.joints && has_level(one) && has_level(other)
 }
 
 /// Difference of two periods that are one, of either.
@@ -677,21 +668,11 @@ fn ripples_alike(ripple: &Candidate, pulley: &Candidate, robot: &Robot) -> bool 
     (turn / order - period).abs() < ALIKE * period
 }
 
-/// May a form be there in a part of a run only?
-fn comes_and_goes(family: &Family) -> bool {
-    !ALWAYS.contains(&family.physics) && may_have_edges(family)
-}
-
-/// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant.
-fn may_have_edges(family: &Family) -> bool {
-    family.form != STEPS_IN_TIME && !HARDENING.contains(&family.form)
-}
-
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
-    let edges = candidate.edges().min(2);
-    let late = edges > 0 && candidate.family.physics == "measurement_delay";
-    candidate.family.penalty_nats + [0.0, 8.0, 20.0][edges] + if late { LATE_IN_A_WINDOW } else { 0.0 }
+    let late = candidate.windows.is_some() && candidate.family.physics == "measurement_delay";
+    let windows = candidate.windows.as_ref().map_or(0.0, Windows::price);
+    candidate.family.penalty_nats + windows + if late { LATE_IN_A_WINDOW } else { 0.0 }
 }
 
 /// Does an effect show in more than a block or two: in their gains, their ranks, or the squared error that each explains?
@@ -778,7 +759,7 @@ pub fn describe(scored: &Scored) -> String {
         family.form,
         family.shape,
         c.shape,
-        c.window,
+        c.windows.as_ref().map(Windows::all),
         scored.coefficients
     )
 }

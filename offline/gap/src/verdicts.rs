@@ -9,11 +9,11 @@ use gap_report::{
     ranked, timestamp,
 };
 
-use crate::analysis::{Found, Given, Options, Outcome};
+use crate::analysis::{Found, Given, Options, Outcome, held_out_of};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
 use crate::held_out::{Refused, Sized, sized};
-use crate::hypothesis::{Candidate, UNMODELLED};
+use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window, Windows};
 use crate::intervals::{Edge, Estimate};
 use crate::nominal::rms;
 use crate::pictures;
@@ -83,7 +83,7 @@ pub(crate) fn insufficient(
     report.status = Status::InsufficientData;
     report.timing.total_s = begun.elapsed().as_secs_f64();
     report.summary = gap_report::headlines(&report).join(" ");
-    Outcome { report, pictures: Pictures::default(), corrected: None, left_out: Vec::new(), left: f64::NAN }
+    Outcome { report, pictures: Pictures::default(), corrected: None, left_out: Vec::new(), left: f64::NAN, elsewhere: 0.0 }
 }
 
 /// The whole report.
@@ -171,12 +171,13 @@ pub(crate) fn outcome(
         corrected: text,
         left_out: corrected.map_or_else(Vec::new, |models| models.left_out),
         left: f64::NAN,
+        elsewhere: 0.0,
     }
 }
 
 /// Everything but the answer.
 fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, data_quality: Vec<DataQuality>) -> Report {
-    let out = if runs.len() == 1 { 1 } else { (runs.len() / 4).max(1) };
+    let out = held_out_of(runs.len());
     let told_runs = runs.iter().zip(given).enumerate().map(|(k, (extent, one))| {
         let (seconds, rate) = (extent.seconds(), 1.0 / extent.dt_s);
         let mut run = if runs.len() == 1 {
@@ -276,9 +277,9 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let probability = (1.0 / total).min(if effect.second { SECOND } else { 1.0 });
     let candidate = &effect.chosen.candidate;
     let physics = physics(candidate);
-    let mut location = location(found, candidate, estimate, effect.share);
+    let mut location = location(found, k, effect.share);
     location.workspace_region = region::of_effect(found, k, main_cell(found.floors, candidate, &estimate.coefficients));
-    let fit = fits(found, candidate, &estimate.coefficients);
+    let fit = fits(found, k);
     let score = Score {
         folds: Some(found.problem.block_count as u64),
         threshold_nats: Some(threshold),
@@ -394,7 +395,8 @@ fn site(found: &Found, candidate: &Candidate) -> Option<String> {
     Some(format!("{place} (link {}, {:.3}, {:.3}, {:.3} m)", found.robot.links[link], at[0], at[1], at[2]))
 }
 
-fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f64) -> Location {
+fn location(found: &Found, k: usize, share: f64) -> Location {
+    let (candidate, estimate) = (&found.answer.effects[k].chosen.candidate, &found.estimates[k]);
     let cell = &found.problem.cells[main_cell(found.floors, candidate, &estimate.coefficients)];
     let mut regime = regime::regime(candidate);
     if let Some(place) = site(found, candidate) {
@@ -403,15 +405,25 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
     regime.energy_share = Some(share.clamp(0.0, 1.0));
     let mut location = Location::new(told(cell.channel), joints(found.robot, candidate), regime::subsystem(candidate), regime);
     location.energy_share = Some(share.clamp(0.0, 1.0));
-    if let Some(window) = &estimate.window {
-        for pair in found.problem.pairs.iter().chain(found.held.pairs) {
-            let told = interval(&pair.real.run, window);
+    let fitted = found.problem.pairs.iter().enumerate().map(|(r, pair)| {
+        let edges = estimate.windows.get(r).or(estimate.windows.first());
+        (pair, candidate.window_of(r), edges)
+    });
+    let held = found.held.pairs.iter().enumerate().map(|(r, pair)| {
+        let window = found.window_there(k, r);
+        // As it was fitted, or as it is there.
+        let as_fitted = candidate.windows.as_ref().is_some_and(|windows| windows.all() == [window]);
+        (pair, window, estimate.windows.first().filter(|_| as_fitted))
+    });
+    if candidate.windows.is_some() || found.held_windows[k].is_some() {
+        for (pair, window, edges) in fitted.chain(held).filter(|(_, window, _)| *window != NEVER) {
+            let told = interval(&pair.real.run, window, edges);
             match location.time_intervals.last_mut() {
                 // The last third of a single run, which is held out, goes on where the rest ended.
-                Some(last) if last.run == told.run && told.end_s > told.start_s => {
+                Some(last) if last.run == told.run && told.end_s > told.start_s && told.start_s < last.end_s + BETWEEN_S => {
                     (last.end_s, last.end_ci95_s) = (told.end_s, told.end_ci95_s);
                 }
-                Some(last) if last.run == told.run => {}
+                Some(last) if last.run == told.run && told.end_s <= told.start_s => {}
                 _ => location.time_intervals.push(told),
             }
         }
@@ -419,14 +431,17 @@ fn location(found: &Found, candidate: &Candidate, estimate: &Estimate, share: f6
     location
 }
 
-/// A window in a run, on the run's own clock.
-fn interval(run: &Run, window: &[Option<Edge>; 2]) -> Interval {
+/// Longer than what is left out between the fitted part of a single run and the rest, s.
+const BETWEEN_S: f64 = 1.5;
+
+/// A window in a run, on the run's own clock, with the intervals of its edges where they are known.
+fn interval(run: &Run, window: Window, known: Option<&[Option<Edge>; 2]>) -> Interval {
     let (first, last) = (run.start_s.max(0.0), run.time_s(run.len() - 1).max(0.0));
     let start_s = run.start_s - run.since_s;
-    let at = |edge: &Option<Edge>, open: f64| edge.map_or(open, |(t, _)| (start_s + t).clamp(first, last));
-    let mut told = Interval::new(&run.id, at(&window[0], first), at(&window[1], last));
-    let ci = |edge: &Option<Edge>| edge.map(|(_, ci)| ci.map(|t| (start_s + t).max(0.0)));
-    (told.start_ci95_s, told.end_ci95_s) = (ci(&window[0]), ci(&window[1]));
+    let at = |edge: usize, open: f64| if window[edge].is_finite() { (start_s + window[edge]).clamp(first, last) } else { open };
+    let mut told = Interval::new(&run.id, at(0, first), at(1, last));
+    let ci = |edge: usize| known.and_then(|edges| edges[edge]).map(|(_, ci)| ci.map(|t| (start_s + t).max(0.0)));
+    (told.start_ci95_s, told.end_ci95_s) = (ci(0), ci(1));
     told
 }
 
@@ -456,20 +471,19 @@ fn held_ids(found: &Found) -> Vec<String> {
     found.held.pairs.iter().map(|pair| pair.real.run.id.clone()).collect()
 }
 
-fn fits(found: &Found, candidate: &Candidate, theta: &[f64]) -> Vec<FitFigure> {
-    let cell = main_cell(found.floors, candidate, theta);
+fn fits(found: &Found, k: usize) -> Vec<FitFigure> {
+    let cell = main_cell(found.floors, &found.answer.effects[k].chosen.candidate, &found.estimates[k].coefficients);
     let of = &found.problem.cells[cell];
     let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
     let pair = (rms(before.into_iter()), rms(after.into_iter()));
     let floor = Some((found.floors[cell], found.floor_methods[cell]));
-    vec![FitFigure::rms(
-        cell_quantity(found.robot, of),
-        cell_unit(found.robot, of),
-        Space::EquationError,
-        pair,
-        floor,
-        held_ids(found),
-    )]
+    let (quantity, unit) = (cell_quantity(found.robot, of), cell_unit(found.robot, of));
+    let mut fit = FitFigure::rms(quantity, unit, Space::EquationError, pair, floor, held_ids(found));
+    if found.held_windows[k].as_ref().is_some_and(Windows::is_never) {
+        fit.removed_fraction = None;
+        fit.extra.set(gap_report::ABSENT, true);
+    }
+    vec![fit]
 }
 
 fn excess(found: &Found) -> Vec<ExcessRms> {

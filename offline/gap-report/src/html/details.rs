@@ -45,7 +45,7 @@ fn plain_role(role: RunRole) -> &'static str {
         RunRole::Train => "fitting",
         RunRole::HeldOut => "judging (held out)",
         RunRole::Split => "fitting; judging",
-        RunRole::Null => "null",
+        RunRole::Null => "comparing (nothing missing)",
         RunRole::Calibration => "calibration",
     }
 }

@@ -2,7 +2,7 @@
 
 use super::tags::{around, text};
 use crate::text::{as_given, capital, percent, plain_metric};
-use crate::{Fit, Metric, Space};
+use crate::{ABSENT, Fit, Metric, Space};
 
 /// One figure before, after and by noise alone.
 pub(super) fn fit(fit: &Fit) -> String {
@@ -26,6 +26,9 @@ pub(super) fn fit(fit: &Fit) -> String {
             format!(" (95 % interval {} to {})", percent(low).trim_end_matches(['\u{a0}', '%']), percent(high))
         });
         out += &text("p", "gone", &format!("{} of the removable error is gone{interval}.", percent(gone)));
+    }
+    if fit.extra.get(ABSENT).is_some() {
+        out += &text("p", "gone", "Nothing of it is in these runs.");
     }
     around("div", "fit", &out)
 }

@@ -4,7 +4,7 @@ use super::headline::{headlines_unbroken, plain_spaces, quality_headline};
 use super::joints::{capital, joints, listed};
 use super::number::{as_given, percent, probability};
 use super::region::region;
-use crate::{Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
+use crate::{ABSENT, Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
 
 /// Characters per line.
 const WIDTH: usize = 100;
@@ -63,6 +63,9 @@ fn improvement(fit: &Fit) -> String {
     let gone = fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share)));
     let (before, after) = (as_given(fit.before, &fit.unit), as_given(fit.after, &fit.unit));
     let space = if fit.space == Space::ClosedLoop { " in the loop" } else { "" };
+    if fit.extra.get(ABSENT).is_some() {
+        return format!("{} off by {before} {metric}{floor}: nothing of it is there", fit.quantity);
+    }
     format!("{}{space} {before} \u{2192} {after} {metric}{floor}{gone}", fit.quantity)
 }
 

@@ -82,6 +82,9 @@ pub struct Fit {
     pub extra: Extra,
 }
 
+/// Key of a fit's `extra`: nothing of the cause is in the runs on which it was judged.
+pub const ABSENT: &str = "x_absent";
+
 impl Fit {
     /// An RMS in `unit` before and after on held-out runs, with the share of removable error that is gone.
     pub fn rms(

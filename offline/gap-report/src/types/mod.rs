@@ -16,7 +16,7 @@ pub use artifact::{Artifact, Format};
 pub use evidence::{Confusable, EffectSize, Evidence, TestData, TestMethod};
 pub use experiment::{Experiment, Trajectory, TrajectoryKind};
 pub use extra::Extra;
-pub use fit::{Fit, FloorMethod, Metric, Score, Space, removed_fraction};
+pub use fit::{ABSENT, Fit, FloorMethod, Metric, Score, Space, removed_fraction};
 pub use inputs::{Access, Channel, Inputs, Robot, Run, RunKind, RunRole, Simulator, Tool};
 pub use location::{Feature, Interval, Location, Regime, Region, RegionKind, Subsystem};
 pub use parameter::{CiMethod, Identifiable, Parameter};

@@ -5,12 +5,10 @@ use std::sync::OnceLock;
 use arm::serial::{PARAMETERS, SerialArm, Workspace};
 use nalgebra::DMatrix;
 
+use super::windows::Windows;
 use crate::motion::{Motion, State};
 use crate::nominal::Evaluator;
 use crate::problem::{Channel, Problem};
-
-/// From when to when an effect is there, s from the start of each run; infinite where it does not begin or end in it.
-pub type Window = [f64; 2];
 
 /// One coefficient's part in every residual: `(cell, values)`, absent where it has none. The library is what fills the memory:
 /// values in single precision take half of it, and differ by less than any recording resolves; sums are made in double.
@@ -55,11 +53,12 @@ impl Column {
         }
     }
 
-    /// The same within a window of each run only, s from its start: what begins at once begins in the rows as everything is smoothed in them.
+    /// The same within windows of the runs only: what begins at once begins in the rows as everything is smoothed in them.
     #[must_use]
-    pub fn within(&self, problem: &Problem, [from_s, to_s]: Window) -> Self {
+    pub fn within(&self, problem: &Problem, windows: &Windows) -> Self {
         self.weighted(problem, |r, i| {
             let motion = &problem.pairs[r].real;
+            let [from_s, to_s] = windows.of(r);
             let t = motion.run.elapsed_s(i);
             motion.window.of_a_step(t - from_s) - motion.window.of_a_step(t - to_s)
         })

@@ -10,6 +10,7 @@ mod kinematic;
 mod timing;
 mod transmission;
 mod unknown;
+mod windows;
 
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
@@ -19,12 +20,13 @@ pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 
 use std::sync::Arc;
 
-pub use dictionary::{Column, Dictionary, Window};
+pub use dictionary::{Column, Dictionary};
 pub(crate) use environment::WALL;
 pub use environment::direction;
 pub(crate) use friction::{AT_MOTOR, BEFORE, STRIBECK_RANGE};
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
+pub use windows::{ALWAYS, NEVER, Window, Windows, with_one_edge};
 
 use crate::problem::Channel;
 
@@ -242,6 +244,16 @@ impl Family {
         self.form.split(',').next().unwrap_or(self.form)
     }
 
+    /// May it be there in a part of a run only?
+    pub fn comes_and_goes(&self) -> bool {
+        !ALL_THE_TIME.contains(&self.physics) && self.may_have_edges()
+    }
+
+    /// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant.
+    pub fn may_have_edges(&self) -> bool {
+        self.form != STEPS_IN_TIME && !HARDENING.contains(&self.form)
+    }
+
     /// Less likely than its rivals by so much, before any data.
     #[must_use]
     pub fn penalised(mut self, nats: f64) -> Self {
@@ -249,6 +261,9 @@ impl Family {
         self
     }
 }
+
+/// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
+const ALL_THE_TIME: [&str; 1] = ["stribeck_friction"];
 
 /// Edges of windows closer than that are one, s: an effect takes its time to come, and its edge is known no better.
 const SAME_EDGE_S: f64 = 0.3;
@@ -264,7 +279,7 @@ pub struct Candidate {
     /// Numbers that fix its shape, in the family's order.
     pub shape: Vec<f64>,
     /// When it is there; none: always.
-    pub window: Option<Window>,
+    pub windows: Option<Windows>,
     /// One per coefficient; shared, since candidates are copied where they are compared.
     pub columns: Arc<Vec<Column>>,
     /// Parts of its one column, the first of which has to bear it out; none: nothing has to.
@@ -273,32 +288,37 @@ pub struct Candidate {
 
 impl Candidate {
     /// Makes the columns.
-    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], window: Option<Window>) -> Self {
+    pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], windows: Option<&Windows>) -> Self {
         let made = |make: &Columns| {
             let mut columns = make(dictionary, shape);
             for column in &mut columns {
                 column.silence(dictionary.problem);
-                if let Some(window) = window {
-                    *column = column.within(dictionary.problem, window);
+                if let Some(windows) = windows {
+                    *column = column.within(dictionary.problem, windows);
                 }
             }
             Arc::new(columns)
         };
         let apart = family.apart.as_ref().map_or_else(Arc::default, |parts| made(&**parts));
-        Self { family: family.clone(), shape: shape.to_vec(), window, columns: made(&*family.columns), apart }
+        Self { family: family.clone(), shape: shape.to_vec(), windows: windows.cloned(), columns: made(&*family.columns), apart }
     }
 
-    /// Numbers of its window that lie in the runs.
+    /// Numbers of its windows that lie in the runs.
     pub fn edges(&self) -> usize {
-        self.window.map_or(0, |window| window.iter().filter(|t| t.is_finite()).count())
+        self.windows.as_ref().map_or(0, |windows| windows.edges().len())
     }
 
-    /// The same within a window.
+    /// The same within windows.
     #[must_use]
-    pub fn within(&self, problem: &crate::problem::Problem, window: Window) -> Self {
-        let there = |columns: &[Column]| Arc::new(columns.iter().map(|column| column.within(problem, window)).collect());
+    pub fn within(&self, problem: &crate::problem::Problem, windows: &Windows) -> Self {
+        let there = |columns: &[Column]| Arc::new(columns.iter().map(|column| column.within(problem, windows)).collect());
         let (columns, apart) = (there(&self.columns), there(&self.apart));
-        Self { family: self.family.clone(), shape: self.shape.clone(), window: Some(window), columns, apart }
+        Self { family: self.family.clone(), shape: self.shape.clone(), windows: Some(windows.clone()), columns, apart }
+    }
+
+    /// When it is there in a run.
+    pub fn window_of(&self, run: usize) -> Window {
+        self.windows.as_ref().map_or(ALWAYS, |windows| windows.of(run))
     }
 
     /// A number of its shape.
@@ -335,6 +355,11 @@ impl Candidate {
         crate::nominal::rms(self.effect(cell, coefficients).into_iter())
     }
 
+    /// The same of the rows where it is.
+    pub fn rms_where_it_is(&self, cell: usize, coefficients: &[f64]) -> f64 {
+        crate::nominal::rms(self.effect(cell, coefficients).into_iter().filter(|x| *x != 0.0))
+    }
+
     /// Of each block, whether it shows there.
     pub fn blocks(&self, problem: &crate::problem::Problem) -> Vec<bool> {
         let mut shows = vec![false; problem.block_count];
@@ -349,11 +374,10 @@ impl Candidate {
     /// Of each block, whether it begins or ends there, or is still on its way: what is left of such a block says nothing of the others.
     pub fn blocks_of_edges(&self, problem: &crate::problem::Problem) -> Vec<bool> {
         let mut edges = vec![false; problem.block_count];
-        let finite: Vec<f64> = self.window.into_iter().flatten().filter(|t| t.is_finite()).collect();
         for (cell, blocks) in problem.cells.iter().zip(&problem.blocks) {
             for (&(r, i), block) in cell.rows.iter().zip(blocks) {
                 let t = problem.pairs[r].real.run.elapsed_s(i);
-                edges[*block] |= finite.iter().any(|edge| (edge - EDGE_KNOWN_S..edge + SAME_EDGE_S).contains(&t));
+                edges[*block] |= self.window_of(r).iter().any(|edge| (edge - EDGE_KNOWN_S..edge + SAME_EDGE_S).contains(&t));
             }
         }
         edges
@@ -366,8 +390,7 @@ impl Candidate {
 
     /// Does one begin or end where the other does?
     pub fn shares_edge(&self, other: &Self) -> bool {
-        let edges = |candidate: &Self| candidate.window.into_iter().flatten().filter(|t| t.is_finite()).collect::<Vec<f64>>();
-        edges(self).iter().any(|own| edges(other).iter().any(|its| (own - its).abs() < SAME_EDGE_S))
+        self.windows.as_ref().zip(other.windows.as_ref()).is_some_and(|(own, its)| own.share_edge(its, SAME_EDGE_S))
     }
 
     /// Is it friction by load with a level of dry friction beside?

@@ -1,7 +1,7 @@
 //! Shapes whose numbers are refined all at once: those of a memory depend on each other.
 
 use super::{Scored, Search, simpler_is_enough};
-use crate::hypothesis::{Candidate, Column, Window};
+use crate::hypothesis::{Candidate, Column, Windows};
 use crate::intervals::slopes_of;
 use crate::parallel;
 use crate::refine::edges_moved;
@@ -48,7 +48,7 @@ impl Search<'_, '_> {
                 for (k, by) in free.iter().zip(&moves) {
                     shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
                 }
-                let candidate = Candidate::new(self.dictionary, &family, &shape, best.window);
+                let candidate = Candidate::new(self.dictionary, &family, &shape, best.windows.as_ref());
                 let (misfit, own) = if candidate.shows() { self.scorer.fitted(base, &candidate) } else { return None };
                 (misfit < least).then_some((candidate, misfit, own))
             });
@@ -98,21 +98,27 @@ impl Search<'_, '_> {
     pub(super) fn refined_often_in_windows(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
         let mut tried: Vec<&Candidate> = Vec::new();
         for Scored { candidate, .. } in claims.iter().take(MANY).filter(|s| s.score > self.thresholds.nats) {
-            if candidate.window.is_some() && !tried.iter().any(|other| other.shares_edge(candidate)) {
+            if candidate.windows.is_some() && !tried.iter().any(|other| other.shares_edge(candidate)) {
                 tried.push(candidate);
             }
         }
         let found = |best: &&Candidate| {
             let there = |c: &Candidate| c.family.joints.first() == best.family.joints.first();
-            self.refined_starts(grams, base, &there, best.window)
+            self.refined_starts(grams, base, &there, best.windows.as_ref())
         };
         tried.iter().flat_map(found).collect()
     }
 
-    fn refined_starts(&self, grams: &Grams, base: &Fit, worth: &dyn Fn(&Candidate) -> bool, window: Option<Window>) -> Vec<Scored> {
+    fn refined_starts(
+        &self,
+        grams: &Grams,
+        base: &Fit,
+        worth: &dyn Fn(&Candidate) -> bool,
+        windows: Option<&Windows>,
+    ) -> Vec<Scored> {
         let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
         let scored = parallel::map(candidates.collect::<Vec<_>>(), |c| {
-            let candidate = window.map_or_else(|| c.clone(), |window| c.within(self.problem, window));
+            let candidate = windows.map_or_else(|| c.clone(), |windows| c.within(self.problem, windows));
             if candidate.shows() { self.score(grams, base, &candidate) } else { None }
         });
         let mut starts: Vec<Scored> = scored.into_iter().flatten().collect();

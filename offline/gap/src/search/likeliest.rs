@@ -37,7 +37,7 @@ const BY_OWN_NUMBERS: [f64; 2] = [0.1, 0.3];
 /// Is a loop that the best claim says, but for this share of it, the straight line that the other one says?
 fn is_straight(best: &Scored, line: &Scored, but_for: f64) -> bool {
     let physics = |scored: &Scored| scored.candidate.family.physics;
-    if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.window != line.candidate.window {
+    if (physics(best), physics(line)) != ("cable_hysteresis", "cable_stretch") || best.candidate.windows != line.candidate.windows {
         return false;
     }
     let effect = |scored: &Scored, cell: usize| scored.candidate.effect(cell, &scored.coefficients);
