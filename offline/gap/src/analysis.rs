@@ -227,7 +227,7 @@ pub fn analyse(
     let told = |message: String| DataQuality::new("runs_differ", Level::Warn, message);
     // What cannot be analysed by itself leaves the answer of all together.
     match analyse(model, &given[first..], options, progress) {
-        Ok(mut held) if !matches!(held.report.status, Status::NoMismatch | Status::InsufficientData) => {
+        Ok(mut held) if says_more(&held.report, whole.elsewhere) => {
             let of_runs =
                 |quality: &DataQuality| quality.run.as_ref().is_some_and(|id| given[..first].iter().any(|one| one.id == *id));
             held.report.data_quality.extend(whole.report.data_quality.into_iter().filter(of_runs));
@@ -244,6 +244,15 @@ pub fn analyse(
             }
             Ok(whole)
         }
+    }
+}
+
+/// Does a run by itself say more than all together, which agree? A name does; what has none may be noise that differs, if it is not large.
+fn says_more(report: &Report, times_more: f64) -> bool {
+    match report.status {
+        Status::Explained | Status::PartlyExplained => true,
+        Status::Unmodelled => times_more > MORE_THERE,
+        Status::NoMismatch | Status::InsufficientData => false,
     }
 }
 
