@@ -165,6 +165,11 @@ impl Found<'_> {
         self.held_windows[effect].as_ref().map_or(ALWAYS, |windows| windows.of(run))
     }
 
+    /// Is nothing of an effect in any run that was held out?
+    pub(crate) fn is_absent(&self, effect: usize) -> bool {
+        self.held_windows[effect].as_ref().is_some_and(Windows::is_never)
+    }
+
     /// Is what was held out a later part of the only run?
     pub(crate) fn is_later_part(&self) -> bool {
         self.held_out().is_later_part()

@@ -10,7 +10,6 @@ use simulator::model::RobotModel;
 use crate::analysis::{Found, Given};
 use crate::builtin::{along_commands, along_torque};
 use crate::floors::floor;
-use crate::hypothesis::Windows;
 use crate::motion::{Band, Motion};
 use crate::nominal::rms;
 use crate::parallel;
@@ -80,8 +79,7 @@ pub(crate) fn again(models: (&RobotModel, &[RobotModel]), found: &Found, given: 
 /// One more fit for each effect, where there is one.
 fn add_fits(fits: &mut [Vec<Fit>], found: &Found, fit: &dyn Fn(&Cell) -> Option<Fit>) {
     // Of one that is not there, playing says nothing.
-    let there = |k: &usize| !found.held_windows[*k].as_ref().is_some_and(Windows::is_never);
-    for k in (0..fits.len()).filter(there) {
+    for k in (0..fits.len()).filter(|k| !found.is_absent(*k)) {
         let (effect, estimate) = (&found.answer.effects[k], &found.estimates[k]);
         let cell = main_cell(found.floors, &effect.chosen.candidate, &estimate.coefficients);
         fits[k].extend(fit(&found.problem.cells[cell]));
@@ -96,20 +94,19 @@ fn played(
     play: &Play,
 ) -> Result<Vec<Played>, String> {
     let first = given.len().saturating_sub(found.held.pairs.len());
-    let runs = found.held.pairs.iter().zip(&given[first..]);
-    runs.zip(models.1)
-        .map(|((pair, given), after)| {
-            let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
-            let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
-            let (before, after) = parallel::both(|| of(models.0), || of(after));
-            let (before, after) = (before?, after?);
-            let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
-            let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);
-            let smooth = |run: Run| Motion::new(run, band);
-            let (real, (before, after)) = parallel::both(|| smooth(real), || parallel::both(|| smooth(before), || smooth(after)));
-            Ok(Played { real, before, after })
-        })
-        .collect()
+    let runs = found.held.pairs.iter().zip(&given[first..]).zip(models.1);
+    runs.map(|((pair, given), after)| {
+        let from_s = (pair.real.run.since_s - EARLIER_S).max(0.0);
+        let of = |model: &RobotModel| play(model, &given.real, from_s).and_then(|sim| run_of(&sim, found.robot));
+        let (before, after) = parallel::both(|| of(models.0), || of(after));
+        let (before, after) = (before?, after?);
+        let brought = |sim: &Run| common(&pair.real.run, sim).map_err(|error| error.to_string());
+        let ((real, before), (_, after)) = (brought(&before)?, brought(&after)?);
+        let smooth = |run: Run| Motion::new(run, band);
+        let (real, (before, after)) = parallel::both(|| smooth(real), || parallel::both(|| smooth(before), || smooth(after)));
+        Ok(Played { real, before, after })
+    })
+    .collect()
 }
 
 fn run_of(sim: &Recording, robot: &Robot) -> Result<Run, String> {

@@ -111,12 +111,7 @@ pub(crate) fn windows(
 ) -> Vec<Option<Windows>> {
     let runs = held.pairs.len();
     // All runs alike, or each by itself.
-    let alike = |windows: &Option<Windows>| {
-        windows.as_ref().map_or(Some(ALWAYS), |windows| match windows.all() {
-            [one] => Some(*one),
-            _ => None,
-        })
-    };
+    let alike = |windows: &Option<Windows>| windows.as_ref().map_or(Some(ALWAYS), Windows::in_all);
     let mut found: Vec<Vec<Window>> = fitted.iter().map(|windows| vec![alike(windows).unwrap_or(ALWAYS); runs]).collect();
     for k in 0..whole.len() {
         let (own, theta) = &whole[k];

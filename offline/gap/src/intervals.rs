@@ -9,10 +9,7 @@ use crate::robot::Robot;
 use crate::score::{Grams, Scorer};
 use crate::search::{Effect, score_scale};
 
-/// Parameters as one replicate has them.
-type Replicate = Vec<Named>;
-
-/// An instant, s from the start of each run, with its 95 % interval.
+/// An instant, s from the start of a run, with its 95 % interval.
 pub type Edge = (f64, [f64; 2]);
 
 /// What an effect amounts to.
@@ -228,8 +225,7 @@ fn edges(dictionary: &Dictionary, scorer: &Scorer, candidates: &[&Candidate], (k
 
 /// What there is beside one of some candidates.
 fn others_of(scorer: &Scorer, candidates: &[&Candidate], k: usize) -> Grams {
-    let others = candidates.iter().enumerate().filter(|(i, _)| *i != k);
-    others.fold(scorer.empty(), |grams, (_, other)| scorer.extended(&grams, &other.columns))
+    scorer.grams(candidates.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, other)| *other))
 }
 
 /// A candidate among others with its other choices, where these do not fit much worse.
@@ -257,7 +253,7 @@ fn of_candidates(
     candidates: &[&Candidate],
 ) -> Vec<Estimate> {
     // First round: coefficients; second: with the slopes by shape and windows.
-    let plain = candidates.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
+    let plain = scorer.grams(candidates.iter().copied());
     let fit = scorer.fit(&plain);
     let mut grams = scorer.empty();
     let mut layout = Vec::new();
@@ -279,7 +275,7 @@ fn of_candidates(
         .iter()
         .zip(layout)
         .map(|(candidate, (column, theta, which))| {
-            let of = |coefficients: &[f64]| -> Replicate {
+            let of = |coefficients: &[f64]| -> Vec<Named> {
                 let own = &coefficients[column..column + theta.len()];
                 let mut shape = candidate.shape.clone();
                 for (k, which) in which.iter().enumerate() {
@@ -295,10 +291,10 @@ fn of_candidates(
                 parameters(robot, nominal, candidate, &at, &shape)
             };
             let values = of(&wide.coefficients);
-            let replicates: Vec<Replicate> = wide.without.iter().map(|c| of(c)).collect();
-            let spread = |of: &dyn Fn(&Replicate) -> f64| -> f64 {
-                let mean = replicates.iter().map(of).sum::<f64>() / blocks;
-                replicates.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>().sqrt()
+            let replicates: Vec<Vec<Named>> = wide.without.iter().map(|c| of(c)).collect();
+            let spread = |k: usize| -> f64 {
+                let mean = replicates.iter().map(|r| r[k].value).sum::<f64>() / blocks;
+                replicates.iter().map(|r| (r[k].value - mean).powi(2)).sum::<f64>().sqrt()
             };
             let (physics, form) = (candidate.family.physics, candidate.family.form);
             let parameters = values
@@ -307,7 +303,7 @@ fn of_candidates(
                 .map(|(k, named)| {
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
-                    let half = (reach * spread(&|r| r[k].value)).hypot(shared).hypot(supposed(physics, form, named.name));
+                    let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name));
                     let [least, most] = possible(physics, form, named.name);
                     (
                         named.clone(),

@@ -162,6 +162,11 @@ impl<'a> Scorer<'a> {
         Grams { columns: 0, sums, parts: Vec::new() }
     }
 
+    /// Grams of some candidates, in their order.
+    pub fn grams<'c>(&self, candidates: impl IntoIterator<Item = &'c Candidate>) -> Grams {
+        candidates.into_iter().fold(self.empty(), |grams, candidate| self.extended(&grams, &candidate.columns))
+    }
+
     /// Grams with more columns.
     pub fn extended(&self, grams: &Grams, columns: &[Column]) -> Grams {
         let (old, new) = (grams.columns, columns.len());

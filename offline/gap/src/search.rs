@@ -180,7 +180,7 @@ impl Answer<'_> {
 
     fn grams_of(&self, which: impl Fn(usize) -> bool) -> Grams {
         let of = self.effects.iter().enumerate().filter(|(k, _)| which(*k));
-        of.fold(self.scorer.empty(), |grams, (_, effect)| self.scorer.extended(&grams, &effect.chosen.candidate.columns))
+        self.scorer.grams(of.map(|(_, effect)| &effect.chosen.candidate))
     }
 
     fn fit_anew(&mut self) {
@@ -259,11 +259,7 @@ pub fn search<'p>(
 
 impl Search<'_, '_> {
     fn grams(&self, chosen: &[Candidate], without: Option<usize>) -> Grams {
-        chosen
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| Some(*k) != without)
-            .fold(self.scorer.empty(), |grams, (_, candidate)| self.scorer.extended(&grams, &candidate.columns))
+        self.scorer.grams(chosen.iter().enumerate().filter(|(k, _)| Some(*k) != without).map(|(_, candidate)| candidate))
     }
 
     fn judged(&mut self, base: &Grams, others: &[Candidate], scored: &Scored) -> Judged {
@@ -305,7 +301,7 @@ impl Search<'_, '_> {
     /// what it leaves, and is whitened away.
     fn significance(&self, others: &[Candidate], candidate: &Candidate) -> Gain {
         let all = |scorer: &Scorer| {
-            let base = others.iter().fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns));
+            let base = scorer.grams(others);
             let with = scorer.extended(&base, &candidate.columns);
             (base, with)
         };
@@ -584,9 +580,7 @@ impl Search<'_, '_> {
         if close < 2 {
             return;
         }
-        let grams = |scorer: &Scorer, one: Option<&Candidate>| {
-            others.iter().chain(one).fold(scorer.empty(), |grams, c| scorer.extended(&grams, &c.columns))
-        };
+        let grams = |scorer: &Scorer, one: Option<&Candidate>| scorer.grams(others.iter().chain(one));
         let fit = self.scorer.fit(&grams(&self.scorer, Some(&best.candidate)));
         let scorer = Scorer::new(self.problem, self.noise_left(others, &best.candidate, &fit));
         let base = scorer.fit(&grams(&scorer, None));

@@ -13,7 +13,7 @@ use crate::analysis::{Found, Given, Options, Outcome, held_out_of};
 use crate::controller::Changed;
 use crate::corrected::Corrected;
 use crate::held_out::{Refused, Sized, sized};
-use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window, Windows};
+use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window};
 use crate::intervals::{Edge, Estimate};
 use crate::nominal::rms;
 use crate::pictures;
@@ -412,7 +412,7 @@ fn location(found: &Found, k: usize, share: f64) -> Location {
     let held = found.held.pairs.iter().enumerate().map(|(r, pair)| {
         let window = found.window_there(k, r);
         // As it was fitted, or as it is there.
-        let as_fitted = candidate.windows.as_ref().is_some_and(|windows| windows.all() == [window]);
+        let as_fitted = candidate.windows.as_ref().is_some_and(|windows| windows.in_all() == Some(window));
         (pair, window, estimate.windows.first().filter(|_| as_fitted))
     });
     if candidate.windows.is_some() || found.held_windows[k].is_some() {
@@ -479,7 +479,7 @@ fn fits(found: &Found, k: usize) -> Vec<FitFigure> {
     let floor = Some((found.floors[cell], found.floor_methods[cell]));
     let (quantity, unit) = (cell_quantity(found.robot, of), cell_unit(found.robot, of));
     let mut fit = FitFigure::rms(quantity, unit, Space::EquationError, pair, floor, held_ids(found));
-    if found.held_windows[k].as_ref().is_some_and(Windows::is_never) {
+    if found.is_absent(k) {
         fit.removed_fraction = None;
         fit.extra.set(gap_report::ABSENT, true);
     }

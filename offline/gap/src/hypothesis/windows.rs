@@ -41,6 +41,11 @@ impl Windows {
         self.0.get(run).copied().unwrap_or(self.0[0])
     }
 
+    /// The window that all runs have, if they are alike.
+    pub fn in_all(&self) -> Option<Window> {
+        if let [one] = *self.0 { Some(one) } else { None }
+    }
+
     /// Every window that there is: one, or one for each run.
     pub fn all(&self) -> &[Window] {
         &self.0
