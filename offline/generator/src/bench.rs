@@ -1,7 +1,7 @@
 //! Brings an effect to the size that is asked for, by playing it with and without.
 
 use crate::draft::{Draft, Scene, draw};
-use crate::effect::Effect;
+use crate::effect::{ALWAYS, Effect, NEVER};
 use crate::order::{Sealed, Wanted};
 use crate::random::Random;
 use crate::run::{Robot, Signals, play};
@@ -23,6 +23,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) clean: &'a Signals,
     /// Duration of a run, s.
     pub(crate) seconds: f64,
+    /// Number of runs.
+    pub(crate) runs: usize,
 }
 
 impl Bench<'_> {
@@ -57,12 +59,23 @@ impl Bench<'_> {
         if wanted.onset && draft.effect.interval.is_none() {
             draft.effect.interval = Some(interval(self.seconds, random));
         }
+        if wanted.by_run {
+            // What is there for a while by its nature is so in each run.
+            let is_passing = draft.effect.interval.is_some();
+            draft.effect.intervals = intervals(is_passing, self.runs, self.seconds, random);
+        }
+        if !wanted.intervals.is_empty() {
+            if wanted.intervals.len() != self.runs {
+                return Err(format!("{} intervals for {} runs", wanted.intervals.len(), self.runs));
+            }
+            draft.effect.intervals.clone_from(&wanted.intervals);
+        }
         if let Some(signal) = &wanted.signal {
             draft.effect.signal = Some(signal.clone());
             draft.place.signal = Some(signal.clone());
         }
         let measure = |effect: &Effect| {
-            let effects = std::slice::from_ref(effect);
+            let effects = &[effect.in_run(effect.first_run())];
             let with = record(&play(&self.exact, effects, self.trajectory), arm, effects, None);
             ratio(&with, self.clean, self.null, self.clean, arm, &draft.place)
         };
@@ -119,6 +132,22 @@ fn search(draft: &Draft, wanted: f64, measure: &dyn Fn(&Effect) -> (f64, usize))
         size = (size * (wanted / reached.0.max(1e-9)).clamp(0.02, 20.0)).min(draft.largest);
     }
     best.map_or_else(|| (draft.sized(size), (0.0, 0)), |(_, effect, reached)| (effect, reached))
+}
+
+/// One interval for each run: another one in each; in the last run only; in all but the last; or in whole runs and not in others.
+fn intervals(is_passing: bool, runs: usize, seconds: f64, random: &mut Random) -> Vec<[f64; 2]> {
+    let last = runs - 1;
+    match random.index(if is_passing { 3 } else { 4 }) {
+        0 => (0..runs).map(|_| interval(seconds, random)).collect(),
+        1 => (0..runs).map(|run| if run == last { interval(seconds, random) } else { NEVER }).collect(),
+        2 => (0..runs).map(|run| if run == last { NEVER } else { interval(seconds, random) }).collect(),
+        _ => {
+            let (there, absent) = (random.index(runs), 1 + random.index(last.max(1)));
+            let absent = (there + absent) % runs;
+            let is_there = |run| run == there || (run != absent && random.index(2) == 0);
+            (0..runs).map(is_there).map(|is_there| if is_there { ALWAYS } else { NEVER }).collect()
+        }
+    }
 }
 
 /// Comes, goes, or both, with at least a fifth of the run on either side of each edge.

@@ -62,7 +62,15 @@ impl Order {
         };
         let clean = record(&sims[0], &pair.truth, &[], None);
         let scene = Scene { arm: &pair.truth, runs: &sims, noise: &noise };
-        let bench = Bench { exact, trajectory: &trajectories[0], scene, null: &null, clean: &clean, seconds: self.seconds };
+        let bench = Bench {
+            exact,
+            trajectory: &trajectories[0],
+            scene,
+            null: &null,
+            clean: &clean,
+            seconds: self.seconds,
+            runs: self.runs,
+        };
         let effects: Vec<Sealed> = self
             .effects
             .iter()
@@ -73,6 +81,7 @@ impl Order {
 
         let mut files = BTreeMap::from([("robot.urdf".to_owned(), urdf::text(&pair.model).into_bytes())]);
         for (run, trajectory) in trajectories.iter().enumerate() {
+            let plain: Vec<Effect> = plain.iter().map(|effect| effect.in_run(run)).collect();
             let seen = record(
                 &play(&stepped, &plain, trajectory),
                 &pair.truth,

@@ -23,7 +23,15 @@ pub struct Effect {
     /// Start and end in seconds of every run; without it the whole of all runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
+    /// Start and end in seconds, one for each run, of what is at other times in other runs; empty otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intervals: Vec<[f64; 2]>,
 }
+
+/// The interval of what is not in a run at all.
+pub const NEVER: [f64; 2] = [1e6, 1e6];
+/// The interval of what is in all of a run.
+pub const ALWAYS: [f64; 2] = [-1e6, 1e6];
 
 /// Duration over which an effect comes or goes, s.
 pub const RAMP: f64 = 0.04;
@@ -38,6 +46,17 @@ impl Effect {
     /// A parameter or detail by name; 0 where it is not given.
     pub fn value(&self, name: &str) -> f64 {
         self.parameters.get(name).or_else(|| self.details.get(name)).copied().unwrap_or(0.0)
+    }
+
+    /// As it is in one run, counted from 0.
+    #[must_use]
+    pub fn in_run(&self, run: usize) -> Self {
+        Self { interval: self.intervals.get(run).copied().or(self.interval), intervals: Vec::new(), ..self.clone() }
+    }
+
+    /// The first run that it is in, counted from 0.
+    pub fn first_run(&self) -> usize {
+        self.intervals.iter().position(|interval| *interval != NEVER).unwrap_or(0)
     }
 
     /// Index of the joint, counted from 0.

@@ -74,10 +74,11 @@ impl Set {
         self.orders.push(order);
     }
 
-    fn nulls(&mut self, noise: f64, count: usize) {
+    fn nulls(&mut self, noise: f64, count: usize, runs: usize) {
         for index in 0..count {
             self.add("null", Vec::new(), |order| {
                 order.noise = noise;
+                order.runs = runs;
                 order.robot = kind(index % 4 == 3);
             });
         }
@@ -89,6 +90,19 @@ impl Set {
                 for &severity in severities {
                     self.add("outside", vec![wanted(physics, severity)], |order| order.robot = kind(repeat % 4 == 3));
                 }
+            }
+        }
+    }
+
+    /// Effects that are at other times in other runs.
+    fn by_run(&mut self, severities: &[f64], repeats: usize) {
+        for physics in PHYSICS {
+            for repeat in 0..repeats {
+                let effect = Wanted { by_run: true, ..wanted(physics, severities[repeat % severities.len()]) };
+                self.add("by_run", vec![effect], |order| {
+                    order.runs = 3 + repeat % 2;
+                    order.robot = kind(repeat % 4 == 3);
+                });
             }
         }
     }
@@ -138,11 +152,11 @@ fn small(seed: u64) -> Vec<Order> {
             set.add("single", vec![wanted(physics, severity)], |_| ());
         }
     }
-    set.nulls(1.0, 30);
+    set.nulls(1.0, 30, 2);
     set.orders
 }
 
-/// The matrix of the design, section 9, and a block of effects as large as those of data/gap-examples.
+/// The matrix of the design, section 9, a block of effects as large as those of data/gap-examples, and one of effects by run.
 fn full(seed: u64) -> Vec<Order> {
     let mut set = Set { seed, name: "full", orders: Vec::new() };
     for physics in PHYSICS {
@@ -169,10 +183,12 @@ fn full(seed: u64) -> Vec<Order> {
         }
     }
     for noise in [1.0, 2.0, 4.0] {
-        set.nulls(noise, 110);
+        set.nulls(noise, 110, 2);
     }
     set.pairs(60, &[1.0, 3.0]);
     set.outside(&[3.0, 10.0], 5);
+    set.by_run(&[3.0, 10.0], 4);
+    set.nulls(1.0, 22, 4);
     set.orders
 }
 
@@ -190,8 +206,9 @@ fn dev(seed: u64) -> Vec<Order> {
         set.add("variant", vec![wanted(physics, 3.0)], |order| order.robot = Kind::Variant);
         set.add("poor", vec![wanted(physics, 3.0)], |order| order.excitation = Excitation::Poor);
     }
-    set.nulls(1.0, 30);
+    set.nulls(1.0, 30, 2);
     set.pairs(20, &[3.0]);
     set.outside(&[3.0, 10.0], 1);
+    set.by_run(&[10.0], 2);
     set.orders
 }

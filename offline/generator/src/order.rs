@@ -26,6 +26,10 @@ pub struct Wanted {
     pub interval: Option<[f64; 2]>,
     /// The effect comes or goes inside the runs, at drawn times.
     pub onset: bool,
+    /// Exact intervals, s, one for each run.
+    pub intervals: Vec<[f64; 2]>,
+    /// The effect comes and goes in each run at a drawn time of its own, or is in some of the runs only.
+    pub by_run: bool,
 }
 
 /// Arm of a case.
@@ -97,7 +101,7 @@ pub struct Sealed {
     pub channel: Channel,
     /// Severity that was asked for.
     pub severity_wanted: Option<f64>,
-    /// Severity that was reached, on the first run.
+    /// Severity that was reached, with the first run's commands and the interval of the first run that it is in.
     pub severity: f64,
 }
 

@@ -1,6 +1,8 @@
 //! Cases as a whole: sizes reached, seeds, envelopes, and that nothing leaks.
 
 use generator::batch;
+use generator::case::Case;
+use generator::effect::{ALWAYS, NEVER};
 use generator::order::{Kind, Order, Wanted};
 use generator::{matrix, seal};
 use std::collections::BTreeMap;
@@ -66,6 +68,57 @@ fn jobs_change_nothing_and_a_second_call_resumes() {
     for path in [a, b] {
         std::fs::remove_dir_all(path).unwrap();
     }
+}
+
+#[test]
+fn an_effect_by_run_is_in_the_runs_that_it_is_told_of() {
+    let null = order("by run", &[]).make().unwrap();
+    let made = |intervals: [[f64; 2]; 2]| {
+        let mut order = order("by run", &[("coulomb_friction", 10.0)]);
+        order.effects[0].joint = Some(1);
+        order.effects[0].intervals = intervals.into();
+        order.make().unwrap()
+    };
+    let differs = |case: &Case, run: usize| {
+        let name = format!("real_{}.csv.gz", run + 1);
+        case.files[&name] != null.files[&name]
+    };
+    for run in 0..2 {
+        let case = made(std::array::from_fn(|of| if of == run { ALWAYS } else { NEVER }));
+        assert!(differs(&case, run) && !differs(&case, 1 - run), "{run}");
+        assert!((case.truth.effects[0].severity / 10.0 - 1.0).abs() < 0.12);
+    }
+    // Of one set the sizes are brought to: as it is in the first run that it is in.
+    let [alone, later] = [[NEVER, ALWAYS], [NEVER, [1.0, 3.0]]].map(|intervals| made(intervals).truth.effects[0].clone());
+    assert!(later.effect.parameters["f_c"] > 1.1 * alone.effect.parameters["f_c"], "{later:?} {alone:?}");
+
+    let mut order = order("by run", &[("coulomb_friction", 10.0)]);
+    order.effects[0].intervals = vec![ALWAYS];
+    assert_eq!(order.make().err().as_deref(), Some("1 intervals for 2 runs"));
+}
+
+#[test]
+fn drawn_times_by_run_differ_from_run_to_run() {
+    let mut kinds = [0; 2];
+    for index in 0..12 {
+        let mut order = order(&format!("drawn {index}"), &[]);
+        order.runs = 3;
+        order.effects = vec![Wanted {
+            physics: "joint_offset".into(),
+            joint: Some(1),
+            parameters: BTreeMap::from([("o".to_owned(), 0.01)]),
+            by_run: true,
+            ..Wanted::default()
+        }];
+        let effect = order.make().unwrap().truth.effects[0].effect.clone();
+        assert!(effect.intervals.len() == 3 && effect.interval.is_none(), "{effect:?}");
+        let [first, second, third] = [0, 1, 2].map(|run| effect.intervals[run]);
+        assert!(first != second || second != third, "{effect:?}");
+        assert!(effect.intervals.iter().any(|of| *of != NEVER), "{effect:?}");
+        let whole = effect.intervals.iter().all(|of| [NEVER, ALWAYS].contains(of));
+        kinds[usize::from(whole)] += 1;
+    }
+    assert!(kinds[0] > kinds[1] && kinds[1] > 0, "{kinds:?}");
 }
 
 #[test]
@@ -171,7 +224,10 @@ fn other_arms_hold_their_course() {
 fn sets_have_the_cases_of_the_design() {
     let count = |orders: &[Order], block: &str| orders.iter().filter(|order| order.block == block).count();
     let full = matrix::named("full", 1).unwrap();
-    assert_eq!(["single", "null", "pairs", "outside", "poor"].map(|block| count(&full, block)), [990, 330, 120, 60, 110]);
+    assert_eq!(
+        ["single", "null", "pairs", "outside", "poor", "by_run"].map(|block| count(&full, block)),
+        [990, 352, 120, 60, 110, 88]
+    );
     let small = matrix::named("small", 1).unwrap();
     assert_eq!(["single", "null"].map(|block| count(&small, block)), [66, 30]);
     let mut ids: Vec<String> = full.iter().chain(&small).chain(&matrix::named("dev", 1).unwrap()).map(Order::id).collect();

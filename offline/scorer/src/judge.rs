@@ -177,13 +177,16 @@ fn parameter(measure: &Measure, effect: &Effect, verdict: &Verdict) -> Option<Pa
     (size > 0.0).then(|| Parameter { name: measure.names.join(" "), error: (off / size).sqrt(), covered, disowned })
 }
 
-/// Intersection over union, averaged over the runs.
+/// Intersection over union, averaged over the runs; 1 of a run that the effect is not in and that none is told of.
 fn overlap(effect: &Effect, verdict: &Verdict, report: &Report) -> Option<f64> {
-    let [start, end] = effect.interval?;
+    if effect.intervals.is_empty() && effect.interval.is_none() {
+        return None;
+    }
     let said = &verdict.location.time_intervals;
     let runs = &report.inputs.runs;
     let mut sum = 0.0;
-    for run in runs {
+    for (index, run) in runs.iter().enumerate() {
+        let [start, end] = effect.intervals.get(index).copied().or(effect.interval)?;
         let truth = [start.clamp(0.0, run.duration_s), end.clamp(0.0, run.duration_s)];
         let mut stretches: Vec<[f64; 2]> = said.iter().filter(|s| s.run == run.id).map(|s| [s.start_s, s.end_s]).collect();
         if said.is_empty() {
@@ -199,7 +202,8 @@ fn overlap(effect: &Effect, verdict: &Verdict, report: &Report) -> Option<f64> {
                 reached = to;
             }
         }
-        sum += common / (truth[1] - truth[0] + length - common).max(1e-9);
+        let either = truth[1] - truth[0] + length - common;
+        sum += if either > 0.0 { common / either } else { 1.0 };
     }
     (!runs.is_empty()).then(|| sum / runs.len() as f64)
 }

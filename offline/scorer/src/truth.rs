@@ -20,6 +20,9 @@ pub struct Effect {
     /// Start and end, s; without it the whole run.
     #[serde(default)]
     pub interval: Option<[f64; 2]>,
+    /// The same of each run, where they differ; empty otherwise.
+    #[serde(default)]
+    pub intervals: Vec<[f64; 2]>,
     /// Severity that was asked for.
     #[serde(default)]
     pub severity_wanted: Option<f64>,

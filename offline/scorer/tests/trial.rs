@@ -217,6 +217,24 @@ fn stretch_of_time() {
 }
 
 #[test]
+fn stretches_of_time_by_run() {
+    let folder = Folder::new("times");
+    let mut effect = coulomb(2.0, 3.0);
+    effect["intervals"] = json!([[1e6, 1e6], [-1e6, 1e6], [4.0, 1e6]]);
+    folder.seal("a", &truth("a", "by_run", &json!([effect])));
+    let mut said = verdict(1, "coulomb_friction", &["shoulder"], 0.9, &f_c(2.0, 1.0, 3.0), &[]);
+    said["location"]["time_intervals"] =
+        json!([{"run": "2", "start_s": 0.0, "end_s": 12.0}, {"run": "3", "start_s": 6.0, "end_s": 12.0}]);
+    let mut answer = report("explained", &[said]);
+    let run = |id: &str| json!({"id": id, "duration_s": 12.0});
+    answer["inputs"]["runs"] = json!([run("1"), run("2"), run("3")]);
+    folder.answer("a", &answer);
+    // nothing of nothing, all of all, 6 s of 8 s
+    let overlap = folder.score().judged[0].overlap.unwrap();
+    assert!((overlap - (1.0 + 1.0 + 0.75) / 3.0).abs() < 1e-12, "{overlap}");
+}
+
+#[test]
 fn severity_out_of_reach_counts_where_it_stands() {
     let folder = Folder::new("reach");
     let mut effect = coulomb(2.0, 30.0);
