@@ -25,6 +25,8 @@ pub(crate) const EVICTED: usize = 128 << 20;
 const KEPT_WARM_NS: i64 = 200_000;
 /// Fewest times of which a thousandth is told.
 const THOUSANDTHS: usize = 3_000;
+/// What the names of the engines end with that are run so.
+const WARM: &str = ", kept warm";
 /// Titles of the tables that what is asked looks into.
 const ONCE_A_MS: &str = "Network 118-600-500-400-3, one thread, once a millisecond, asleep between, us";
 const EVICTED_TITLE: &str = "The same with everything out of the caches, us";
@@ -237,7 +239,7 @@ fn kept_warm(network: &Network, contenders: &[Contender]) -> Vec<Contender> {
             let plan = Plan::with(network, InstructionSet::best(), format).in_one_piece();
             let name = named(&plan);
             let floor = contenders.iter().find(|contender| contender.name == name).map_or(0, |contender| contender.floor);
-            Contender::new(format!("{name}, kept warm"), Engine::KeptWarm(Box::new(plan)), floor, &inputs)
+            Contender::new(format!("{name}{WARM}"), Engine::KeptWarm(Box::new(plan)), floor, &inputs)
         })
         .into()
 }
@@ -256,7 +258,8 @@ fn asked(tables: &[Table]) -> Table {
         for (format, floor, runtime) in
             [(Format::F32, 1.08, 1.4), (Format::I16, 1.25, 3.0), (Format::I12, 1.25, 3.0), (Format::I8, 2.2, 5.5)]
         {
-            let ours = table.find(&format!("  ravenpose {format}, {}", best.name()));
+            let name = format!("  ravenpose {format}, {}", best.name());
+            let ours = table.find(&name);
             let (Some(ours), peer) = (ours, table.find_starting("ONNX Runtime")) else { continue };
             all.row(&format!("{format}, {titled}: times its floor, at most"), &met(floor, ours[4], ours[4] <= floor));
             if let Some(peer) = peer {
@@ -264,6 +267,10 @@ fn asked(tables: &[Table]) -> Table {
                 all.row("    times as fast as ONNX Runtime, at least", &met(runtime, faster, faster >= runtime));
                 for (name, at) in [("p99", 1), ("p99.9", 2)].into_iter().filter(|(_, at)| ours[*at].is_finite()) {
                     all.row(&format!("    {name}, us, at most ONNX Runtime's"), &met(peer[at], ours[at], ours[at] <= peer[at]));
+                }
+                if let Some(warm) = table.find(&format!("{name}{WARM}")) {
+                    let faster = 1.0 / warm[5];
+                    all.row("    times as fast, kept warm as the service runs it", &met(runtime, faster, faster >= runtime));
                 }
             }
         }
