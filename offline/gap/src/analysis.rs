@@ -493,8 +493,11 @@ fn analyse_with(
         unmodelled,
         refused: refused.as_ref(),
         // Only against a lab's own simulation, whose floors are known.
-        unexplained: (answer.effects.is_empty() && refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
-            .then(|| unexplained::left(&problem, &floors))
+        unexplained: (refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
+            .then(|| match &sized(&answer.effects, &estimates)[..] {
+                [] => unexplained::left(&problem, &floors),
+                all => unexplained::mostly(&problem, &floors, all),
+            })
             .flatten(),
     };
     progress("judging on what was held out");

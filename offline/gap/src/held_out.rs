@@ -7,7 +7,7 @@ use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
 use crate::nominal::{less_means, mean};
 use crate::problem::Problem;
-use crate::search::{Answer, Effect, Scored, Thresholds, complexity};
+use crate::search::{Answer, Effect, Scored, Thresholds};
 use crate::verdicts::{left, main_cell};
 
 /// Of the squared size of an effect, what it has to leave less of what was held out at least: 1 where it is as it was fitted, -1 where it has
@@ -22,7 +22,7 @@ const STANDS_OUT: f64 = 1.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.
 const INSTEAD: f64 = 0.5;
 const NEAR: f64 = 0.3;
-/// What an effect has to leave there above the noise, in squares of that, for a simpler rival to be asked for; the share of its score that the
+/// What an effect has to leave there above the noise, in squares of that, for a rival to be asked for; the share of its score that the
 /// rival has to have, and what that may leave of it.
 const MUCH: f64 = 3.0;
 const CLOSE: f64 = 0.95;
@@ -154,7 +154,7 @@ impl HeldOut<'_> {
             }
         }
         if self.holds(answer, all, k, thresholds) {
-            return self.plainer_there(answer, all, k).filter(|_| anew).map(Fate::Otherwise);
+            return self.better_there(answer, all, k).filter(|_| anew).map(Fate::Otherwise);
         }
         let exchanged = if answer.effects[k].second { None } else { rival() };
         Some(exchanged.map_or(Fate::Refused, Fate::Exchanged))
@@ -187,8 +187,8 @@ impl HeldOut<'_> {
         if barely { without - with > HOLDS_BARELY * own } else { without - with >= HOLDS * own }
     }
 
-    /// The first simpler rival that scores about as well, and of what was held out leaves far less above the noise where the effect leaves much.
-    fn plainer_there(&self, answer: &Answer, all: &[Sized], k: usize) -> Option<usize> {
+    /// The first rival that scores about as well, and of what was held out leaves far less above the noise where the effect leaves much.
+    fn better_there(&self, answer: &Answer, all: &[Sized], k: usize) -> Option<usize> {
         let effect = &answer.effects[k];
         let cell = main_cell(self.floors, all[k].0, all[k].1);
         let noise = self.floors[cell].powi(2);
@@ -197,7 +197,6 @@ impl HeldOut<'_> {
         let is_close = |rival: &Scored| {
             rival.candidate.family.physics != UNMODELLED
                 && rival.score >= CLOSE * effect.chosen.score
-                && complexity(&rival.candidate) < complexity(&effect.chosen.candidate)
                 && !all.iter().any(|(other, _)| other.same_claim(&rival.candidate))
         };
         let leaves_little =

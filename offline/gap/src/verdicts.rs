@@ -132,7 +132,7 @@ pub(crate) fn outcome(
         verdicts.push(another_controller(found, effects.len() as u64 + 1, changed));
     }
     if let (Some(unexplained), None) = (&found.unexplained, found.controller) {
-        verdicts.push(seen(found, unexplained));
+        verdicts.push(seen(found, effects.len() as u64 + 1, unexplained));
     }
     if found.unmodelled && !unnamed {
         verdicts.push(unmodelled(found, effects.len() as u64 + 1));
@@ -266,6 +266,9 @@ fn total_weight(effect: &Effect) -> f64 {
 /// How probable a claim is at most that was taken in place of one that fits better: so many were right in opened sets (8 of 11).
 const SECOND: f64 = 0.75;
 
+/// And at most where it leaves far more than noise nearly all the time: most were wrong (6 of 7 in opened sets).
+const LEAVES: f64 = 0.5;
+
 /// The primary verdict of an effect and its alternatives.
 fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, threshold: f64, artifact: Artifact) -> Vec<Verdict> {
     let number = k as u64 + 1;
@@ -274,11 +277,14 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let named = |r: &&Scored| r.candidate.family.physics != UNMODELLED;
     let close: Vec<&Scored> = effect.rivals.iter().filter(named).filter(|r| r.score > best - near).take(4).collect();
     let total = total_weight(effect);
-    let probability = (1.0 / total).min(if effect.second { SECOND } else { 1.0 });
     let candidate = &effect.chosen.candidate;
+    let cell = main_cell(found.floors, candidate, &estimate.coefficients);
+    let leaves = found.unexplained.as_ref().is_some_and(|left| left.cell == cell);
+    let most = [(effect.second, SECOND), (leaves, LEAVES)].into_iter().filter(|(is_so, _)| *is_so).map(|(_, most)| most);
+    let probability = most.fold(1.0 / total, f64::min);
     let physics = physics(candidate);
     let mut location = location(found, k, effect.share);
-    location.workspace_region = region::of_effect(found, k, main_cell(found.floors, candidate, &estimate.coefficients));
+    location.workspace_region = region::of_effect(found, k, cell);
     let fit = fits(found, k);
     let score = Score {
         folds: Some(found.problem.block_count as u64),
@@ -536,7 +542,7 @@ fn another_controller(found: &Found, number: u64, changed: Changed) -> Verdict {
 }
 
 /// The verdict of what is there where nothing explains it.
-fn seen(found: &Found, unexplained: &Unexplained) -> Verdict {
+fn seen(found: &Found, number: u64, unexplained: &Unexplained) -> Verdict {
     let cell = &found.problem.cells[unexplained.cell];
     let unit = cell_unit(found.robot, cell);
     let (places, pattern) = match unexplained.pattern {
@@ -548,6 +554,7 @@ fn seen(found: &Found, unexplained: &Unexplained) -> Verdict {
             format!("comes again, mostly at {frequency_hz:.2} Hz"),
             format!("foreseen by its own past, as noise is not: it comes again, mostly at {frequency_hz:.2} Hz"),
         ),
+        Pattern::Mostly => ("nearly all the time".to_owned(), "left by what has a name, nearly all the time".to_owned()),
     };
     let regime = Regime::new(Feature::Time, places);
     let mut location = Location::new(told(cell.channel), vec![cell_name(found.robot, cell)], Subsystem::Unknown, regime);
@@ -562,7 +569,7 @@ fn seen(found: &Found, unexplained: &Unexplained) -> Verdict {
         .collect();
     let (rms, floor) = (unexplained.rms, unexplained.floor);
     let claim = format!("{rms:.3e} {unit} RMS where noise alone gives {floor:.1e}, {pattern}");
-    Verdict::unmodelled(1, 0.9, location, Evidence::new("size over the noise floor", claim, (rms, unit), TestMethod::Gate))
+    Verdict::unmodelled(number, 0.9, location, Evidence::new("size over the noise floor", claim, (rms, unit), TestMethod::Gate))
 }
 
 /// The verdict of an effect whose explanation does not hold on what was held out.
@@ -606,7 +613,7 @@ fn remaining(found: &Found) -> Remaining {
         .chain(found.refused.filter(|_| found.controller.is_none()).map(Refused::goes_with))
         .map(str::to_owned)
         .chain(found.unexplained.as_ref().map(|unexplained| match unexplained.pattern {
-            Pattern::Seldom => "time".to_owned(),
+            Pattern::Seldom | Pattern::Mostly => "time".to_owned(),
             Pattern::Again { frequency_hz } => format!("time, mostly at {frequency_hz:.2} Hz"),
         }))
         .collect();

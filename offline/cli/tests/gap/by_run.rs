@@ -1,6 +1,6 @@
 //! What is not there at the same time of every run.
 
-use crate::common::{Case, Folder, near, primary, wanted, written};
+use crate::common::{Case, Folder, case_of, near, primary, wanted, written};
 use gap_report::{Report, RunRole, Space, Status};
 use generator::order::{Order, Wanted};
 use std::path::PathBuf;
@@ -159,4 +159,31 @@ fn a_step_is_no_loop_that_follows_its_edge() {
     let report = case.judged(&folders[0].file("out"));
     let only = alone(&report, "joint_offset", &[("real_1.csv.gz", 4.0), ("real_2.csv.gz", 7.5)]);
     assert!(only.fit[0].after < 0.05 * only.fit[0].before, "{:?}", only.fit);
+}
+
+#[test]
+fn what_is_there_for_a_while_of_one_run_only_is_found_beside_what_stays_in_others() {
+    // From nothing no single edge leads to a while: this push was a lighter link in the first run.
+    let folder = Folder::new("by-run");
+    let (case, _) = case_of(&folder, "full", 77, "6a58e86f7b6a");
+    let report = case.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "external_contact", "{}", report.summary);
+    let told: Vec<[f64; 2]> = first.location.time_intervals.iter().map(|interval| [interval.start_s, interval.end_s]).collect();
+    let truth = [[5.85, 8.23], [3.80, 12.0], [3.47, 12.0], [4.26, 7.99]];
+    assert_eq!(told.len(), truth.len(), "{told:?}");
+    for (told, truth) in told.iter().flatten().zip(truth.iter().flatten()) {
+        assert!((told - truth).abs() < 0.1, "{told} {truth}");
+    }
+    assert!(first.fit[0].after < 0.05 * first.fit[0].before, "{:?}", first.fit);
+}
+
+#[test]
+fn of_what_fits_alike_the_one_that_holds_later_is_said() {
+    // Four seconds of a creep are a shifted zero; the four that follow, which nothing was fitted to, are not.
+    let folder = Folder::new("by-run");
+    let (case, _) = case_of(&folder, "full", 77, "bc9a4fcc8d47");
+    let report = case.judged(&folder.file("out"));
+    let only = alone(&report, "cable_creep", &[("real_4.csv.gz", 3.94)]);
+    assert_eq!(only.location.joint, ["elbow"]);
 }

@@ -177,6 +177,21 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
 }
 
 #[test]
+fn lost_counts_that_drift_as_warmth_does_are_not_warmth_alone() {
+    // Three losses at the same times of both runs: a position that drifts predicts the other run, and leaves three times the noise of each.
+    let folder = Folder::new("lost");
+    let lost = Wanted { physics: "outside:missed_counts".to_owned(), severity: Some(3.0), ..Wanted::default() };
+    let order = Order { seed: 906, label: "mc6".to_owned(), block: "outside".to_owned(), effects: vec![lost], ..Order::default() };
+    let (case, _) = written(&folder, &order);
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::PartlyExplained, "{}", report.summary);
+    let told = primary(&report);
+    let unmodelled = told.iter().find(|verdict| verdict.physics.to_string() == "unmodelled").expect("something without a name");
+    assert_eq!((unmodelled.location.channel, &unmodelled.location.joint[..]), (Channel::Transmission, &["elbow".to_owned()][..]));
+    assert!(told.iter().all(|verdict| verdict.probability <= 0.5 || verdict.physics.to_string() == "unmodelled"), "{told:?}");
+}
+
+#[test]
 fn what_shakes_an_arm_faster_than_it_moves_is_no_agreement() {
     // Within three rows, 60 ms, half of it turns round: it was taken for noise, and everything for agreement, with a probability of 1.
     const HZ: f64 = 2.7;

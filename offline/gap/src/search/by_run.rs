@@ -78,13 +78,16 @@ impl Search<'_, '_> {
         }
     }
 
-    /// What a window of a run may be instead: all of it, nothing, or with another beginning or end.
+    /// What a window of a run may be instead: all of it, nothing, with another beginning or end, or, roughly, a while of it.
     fn windows_of(&self, run: usize, steps: usize, [from, to]: Window) -> Vec<Window> {
         let of = &self.problem.pairs[run].real.run;
         let at = |k: usize| of.since_s + of.len() as f64 * of.dt_s * k as f64 / steps as f64;
         let edges: Vec<f64> = (1..steps).map(at).collect();
         let begins = edges.iter().filter(|edge| to.is_finite() && **edge < to).map(|edge| [*edge, to]);
         let ends = edges.iter().filter(|edge| from.is_finite() && **edge > from).map(|edge| [from, *edge]);
-        [ALWAYS, NEVER].into_iter().chain(with_one_edge(&edges)).chain(begins).chain(ends).collect()
+        // What is there for a while cannot be come to by one edge after the other from nothing.
+        let rough: Vec<f64> = (1..ROUGH).map(|k| at(k * steps / ROUGH)).collect();
+        let whiles = rough.iter().flat_map(|from| rough.iter().filter(move |to| *to > from).map(move |to| [*from, *to]));
+        [ALWAYS, NEVER].into_iter().chain(with_one_edge(&edges)).chain(begins).chain(ends).chain(whiles).collect()
     }
 }
