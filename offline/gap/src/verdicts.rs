@@ -266,7 +266,7 @@ fn total_weight(effect: &Effect) -> f64 {
 /// How probable a claim is at most that was taken in place of one that fits better: so many were right in opened sets (8 of 11).
 const SECOND: f64 = 0.75;
 
-/// And at most where it leaves far more than noise nearly all the time: most were wrong (6 of 7 in opened sets).
+/// And at most where it leaves far more than noise nearly all the time: such names were wrong in opened sets (6 of 6).
 const LEAVES: f64 = 0.5;
 
 /// The primary verdict of an effect and its alternatives.
