@@ -4,6 +4,7 @@
 //! all the time (an encoder that loses counts drifts, but by steps).
 
 use crate::held_out::Sized;
+use crate::hypothesis::UNMODELLED;
 use crate::noise::Noise;
 use crate::nominal::rms;
 use crate::problem::{Channel, Problem};
@@ -73,10 +74,11 @@ fn by_run<'p>(problem: &'p Problem, c: usize) -> Vec<&'p [f64]> {
     segments(problem, c).into_iter().map(|rows| &problem.cells[c].residual[rows]).collect()
 }
 
-/// What effects leave of a position that one of them is told from, far above its floor for half of the time or more. Of torques nothing is said:
+/// What effects leave of a position that one of those with a name is told from, far above its floor for half of the time or more. Of torques nothing is said:
 /// laws of friction are near ones too.
 pub(crate) fn mostly(problem: &Problem, floors: &[f64], effects: &[Sized]) -> Option<Unexplained> {
-    let exact = effects.iter().filter(|(claim, _)| !NEAR_FORMS.contains(&claim.family.physics));
+    let is_exact = |physics| physics != UNMODELLED && !NEAR_FORMS.contains(&physics);
+    let exact = effects.iter().filter(|(claim, _)| is_exact(claim.family.physics));
     let cells = exact.map(|(claim, coefficients)| main_cell(floors, claim, coefficients));
     let of_cell = |cell: usize| {
         let of = verdicts::left(problem, cell, effects);

@@ -59,6 +59,9 @@ impl Bench<'_> {
         if wanted.onset && draft.effect.interval.is_none() {
             draft.effect.interval = Some(interval(self.seconds, random));
         }
+        if wanted.by_run && self.runs < 2 {
+            return Err("an effect by run asks for two runs at least".into());
+        }
         if wanted.by_run {
             // What is there for a while by its nature is so in each run.
             let is_passing = draft.effect.interval.is_some();

@@ -95,6 +95,8 @@ fn an_effect_by_run_is_in_the_runs_that_it_is_told_of() {
     let mut order = order("by run", &[("coulomb_friction", 10.0)]);
     order.effects[0].intervals = vec![ALWAYS];
     assert_eq!(order.make().err().as_deref(), Some("1 intervals for 2 runs"));
+    (order.runs, order.effects[0].intervals, order.effects[0].by_run) = (1, Vec::new(), true);
+    assert_eq!(order.make().err().as_deref(), Some("an effect by run asks for two runs at least"));
 }
 
 #[test]
