@@ -1,7 +1,7 @@
 //! When an effect is there in what was held out. Its size is not fitted there; when it comes and goes may be, as far as it is otherwise in each
 //! run: nobody picks a weight up at the same time twice.
 
-use crate::hypothesis::{ALWAYS, Candidate, NEVER, Window, Windows, with_one_edge};
+use crate::hypothesis::{ALWAYS, Candidate, NEVER, Window, Windows, with_both_edges, with_one_edge};
 use crate::problem::{Channel, Problem};
 use crate::verdicts::main_cell;
 
@@ -68,9 +68,8 @@ impl<'p> Seen<'p> {
         let step = (last - first) / EDGES as f64;
         let edges: Vec<f64> = (1..EDGES).map(|k| first + k as f64 * step).collect();
         let least = |all: Vec<Window>| all.into_iter().min_by(|a, b| self.left(*a).total_cmp(&self.left(*b))).unwrap_or(ALWAYS);
-        let both = edges.iter().flat_map(|from| edges.iter().filter(move |to| *to > from).map(move |to| [*from, *to]));
         let mut best = least(vec![ALWAYS, NEVER]);
-        for more in [least(with_one_edge(&edges).collect()), least(both.collect())] {
+        for more in [least(with_one_edge(&edges).collect()), least(with_both_edges(&edges).collect())] {
             if self.left(more) + EXPLAINS < self.left(best) {
                 best = more;
             }

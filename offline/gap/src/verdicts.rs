@@ -280,8 +280,12 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let candidate = &effect.chosen.candidate;
     let cell = main_cell(found.floors, candidate, &estimate.coefficients);
     let leaves = found.unexplained.as_ref().is_some_and(|left| left.cell == cell);
-    let most = [(effect.second, SECOND), (leaves, LEAVES)].into_iter().filter(|(is_so, _)| *is_so).map(|(_, most)| most);
-    let probability = most.fold(1.0 / total, f64::min);
+    let at_most = match (leaves, effect.second) {
+        (true, _) => LEAVES,
+        (false, true) => SECOND,
+        (false, false) => 1.0,
+    };
+    let probability = (1.0 / total).min(at_most);
     let physics = physics(candidate);
     let mut location = location(found, k, effect.share);
     location.workspace_region = region::of_effect(found, k, cell);

@@ -26,7 +26,7 @@ pub use environment::direction;
 pub(crate) use friction::{AT_MOTOR, BEFORE, STRIBECK_RANGE};
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
-pub use windows::{ALWAYS, NEVER, Window, Windows, with_one_edge};
+pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
 
 use crate::problem::Channel;
 

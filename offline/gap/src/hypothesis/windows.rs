@@ -19,6 +19,11 @@ pub fn with_one_edge(edges: &[f64]) -> impl Iterator<Item = Window> {
     edges.iter().flat_map(|edge| [[*edge, f64::INFINITY], [f64::NEG_INFINITY, *edge]])
 }
 
+/// Windows between each two edges, of which the later ones come later.
+pub fn with_both_edges(edges: &[f64]) -> impl Iterator<Item = Window> {
+    edges.iter().flat_map(|from| edges.iter().filter(move |to| *to > from).map(move |to| [*from, *to]))
+}
+
 /// When an effect is there: alike in all runs, or in each run by itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Windows(Arc<[Window]>);

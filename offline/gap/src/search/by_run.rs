@@ -1,7 +1,7 @@
 //! When an effect is there, run by run: a weight is not picked up at the same time of every run, and a cable that has slipped stays so.
 
 use super::{Scored, Search};
-use crate::hypothesis::{ALWAYS, Candidate, NEVER, Window, Windows, with_one_edge};
+use crate::hypothesis::{ALWAYS, Candidate, NEVER, Window, Windows, with_both_edges, with_one_edge};
 use crate::score::{Fit, Grams};
 
 /// Steps of the grid of edges in a run.
@@ -87,7 +87,7 @@ impl Search<'_, '_> {
         let ends = edges.iter().filter(|edge| from.is_finite() && **edge > from).map(|edge| [from, *edge]);
         // What is there for a while cannot be come to by one edge after the other from nothing.
         let rough: Vec<f64> = (1..ROUGH).map(|k| at(k * steps / ROUGH)).collect();
-        let whiles = rough.iter().flat_map(|from| rough.iter().filter(move |to| *to > from).map(move |to| [*from, *to]));
+        let whiles = with_both_edges(&rough);
         [ALWAYS, NEVER].into_iter().chain(with_one_edge(&edges)).chain(begins).chain(ends).chain(whiles).collect()
     }
 }
