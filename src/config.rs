@@ -4,6 +4,7 @@ use crate::correction::{Pace, Quantity};
 use crate::cycle::Limits;
 use crate::network::Format;
 use ravenpose_transport::Settings;
+use ravenpose_wire::ARMS;
 use std::io::Read;
 use std::ops::RangeInclusive;
 use std::os::unix::fs::OpenOptionsExt;
@@ -52,6 +53,9 @@ pub enum Wait {
     /// Be woken by the publisher's bell: least processor time, tens of microseconds more.
     Event,
 }
+
+/// The arms' names, as the configuration has them.
+pub const ARM_NAMES: [&str; ARMS] = ["gold", "green"];
 
 /// A checked configuration.
 #[derive(Debug, Clone)]
@@ -157,7 +161,8 @@ impl Config {
         let transport = transport(file.table("transport")?)?;
         let mut looping = file.table("loop")?;
         let limits = limits(file.table("limits")?)?;
-        let models = [arm_models(file.optional_table("gold")?, base)?, arm_models(file.optional_table("green")?, base)?];
+        let [gold, green] = ARM_NAMES;
+        let models = [arm_models(file.optional_table(gold)?, base)?, arm_models(file.optional_table(green)?, base)?];
         let mut report = file.table("report")?;
         let config = Self {
             allow_untrained,

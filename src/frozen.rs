@@ -17,6 +17,8 @@ const MOVING_COUNTS: i64 = 3;
 const MOVING_DEG_S: f32 = 135.0;
 /// Breakaway: 0.05 to 0.1 N m of friction over kp = 0.3 N m/rad is 10 to 19 degrees of motor angle; no motor lags further at rest.
 const RUNAWAY_DEG: f32 = 30.0;
+/// No motor is told to go further (`IMPOSSIBLE` in `guard`); nothing can be compared with such a command.
+const COMMAND_MAX_DEG: f32 = 200_000.0;
 /// Motors with position control at all times and an inertia that is known: shoulder, elbow, insertion.
 const MOTORS: usize = 3;
 
@@ -74,6 +76,9 @@ impl Motor {
         if moved > 0 {
             *self = Self { count, command, speed: moved / i64::from(cycles), ..Self::default() };
             return 0;
+        }
+        if !(-COMMAND_MAX_DEG..=COMMAND_MAX_DEG).contains(&self.command) {
+            self.command = command;
         }
         if self.still == 0 {
             self.stopped_dead = self.speed >= MOVING_COUNTS;
@@ -139,6 +144,26 @@ mod tests {
         assert_eq!(watch.observe(&state, 0), 0);
         state.mpos_d[2] = 31.0;
         assert_eq!(watch.observe(&state, 0), 2);
+    }
+
+    #[test]
+    fn a_command_that_cannot_be_is_not_what_later_ones_are_compared_with() {
+        for bad in [f32::NAN, f32::INFINITY, -1e30] {
+            let mut watch = FrozenWatch::default();
+            let mut state = RavenState::new();
+            state.mpos_d[2] = bad;
+            assert_eq!(watch.observe(&state, 0), 0);
+            state.mpos_d[2] = 100.0;
+            for _ in 0..100 {
+                assert_eq!(
+                    watch.observe(&state, 0),
+                    0,
+                    "after {bad} a robot at rest is none that stands although it is told to move"
+                );
+            }
+            state.mpos_d[2] = 131.0;
+            assert!(watch.observe(&state, 0) > 0, "after {bad} a command that runs away is found");
+        }
     }
 
     #[test]

@@ -5,6 +5,8 @@
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::todo, clippy::unimplemented))]
 
+use std::time::{Duration, Instant};
+
 pub mod card;
 pub mod check;
 pub mod config;
@@ -26,6 +28,20 @@ pub mod shared;
 pub mod signals;
 pub mod watch;
 pub mod writer;
+
+/// How long a log that hangs may hold up the end.
+const LAST_WORDS_MAX: Duration = Duration::from_millis(50);
+
+/// Says why, and ends the process; a log that hangs does not keep it from that.
+pub(crate) fn abort(message: String) -> ! {
+    let begun = Instant::now();
+    if let Ok(said) = std::thread::Builder::new().spawn(move || say(&message)) {
+        while !said.is_finished() && begun.elapsed() < LAST_WORDS_MAX {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    std::process::abort()
+}
 
 /// A line in the log; the loop itself never calls this.
 pub(crate) fn say(message: &str) {

@@ -1,6 +1,6 @@
 //! What the operating system must grant: a core, FIFO priority, locked memory.
 //!
-//! This module contains `unsafe`: the scheduler call, which no safe wrapper in our tree offers, and reading resource usage.
+//! This module contains `unsafe`: the scheduler call, which no safe wrapper in our tree offers.
 
 use rustix::mm::MlockAllFlags;
 use rustix::thread::{CpuSet, sched_setaffinity};
@@ -43,12 +43,20 @@ pub fn pin(core: usize) -> Result<(), Missing> {
         what: format!("the loop cannot be pinned to core {core} ({cause})"),
         remedy: "choose loop.core among the cores that `nproc --all` counts and CPUAffinity= of the unit allows".to_owned(),
     };
+    run_on(core).map_err(|cause| refused(cause.to_string()))
+}
+
+/// [`pin`] for threads other than the loop's.
+///
+/// # Errors
+/// The system's.
+pub fn run_on(core: usize) -> std::io::Result<()> {
     if core >= CpuSet::MAX_CPU {
-        return Err(refused("no such core".to_owned()));
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "no such core"));
     }
     let mut set = CpuSet::new();
     set.set(core);
-    sched_setaffinity(None, &set).map_err(|cause| refused(cause.to_string()))
+    Ok(sched_setaffinity(None, &set)?)
 }
 
 /// Keeps the calling thread, and all that it starts from now on, off the loop's core, if there is any other. What an ordinary thread
@@ -116,17 +124,6 @@ pub fn hold_cpu_dma_latency() -> Result<File, Missing> {
         remedy: "set hold_cpu_dma_latency = false".to_owned(),
     })?;
     Ok(file)
-}
-
-/// Minor and major page faults of the calling thread so far.
-pub fn page_faults() -> (u64, u64) {
-    let mut usage = std::mem::MaybeUninit::<libc::rusage>::zeroed();
-    // SAFETY: the kernel fills the whole struct; zeroed memory is a valid rusage even if it did not.
-    let usage = unsafe {
-        libc::getrusage(libc::RUSAGE_THREAD, usage.as_mut_ptr());
-        usage.assume_init()
-    };
-    (usage.ru_minflt as u64, usage.ru_majflt as u64)
 }
 
 /// The calling thread's scheduling policy, priority and the cores that it may run on.

@@ -3,6 +3,7 @@
 //! Files appear whole or not at all: written beside their name and renamed. The log grows by whole lines; what a failed write left is
 //! cut off again.
 
+use crate::config::ARM_NAMES;
 use crate::histogram::{Histograms, STAGES};
 use crate::shared::{COUNTER_NAMES, Shared};
 use hdrhistogram::Histogram;
@@ -77,7 +78,7 @@ impl Stats {
             .map(|arm| {
                 let (status, flags) = shared.arm(arm);
                 ArmStats {
-                    arm: ["gold", "green"][arm].to_owned(),
+                    arm: ARM_NAMES[arm].to_owned(),
                     status: ArmStatus::name(status).to_owned(),
                     flags: flag_names(flags).map(str::to_owned).collect(),
                     model: models[arm].clone(),

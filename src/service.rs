@@ -1,6 +1,6 @@
 //! `ravenposed`: start, the ordinary thread beside the loop, and the end.
 
-use crate::config::{Config, ModelSource, Wait};
+use crate::config::{ARM_NAMES, Config, ModelSource, Wait};
 use crate::correction::ArmModel;
 use crate::cycle::{ArmModels, Cycle};
 use crate::histogram::{self, Histograms};
@@ -8,8 +8,8 @@ use crate::model::{self, Estimate, Loaded, ModelError};
 use crate::realtime::{self, Missing};
 use crate::runner::{Ended, Runner, TestHook, Waiting};
 use crate::shared::{self, EventSender, Shared};
-use crate::watch::{NAMES, TICK, Watch, notify};
-use crate::{say, signals};
+use crate::watch::{self, TICK, Watch, notify};
+use crate::{abort, say, signals};
 use ravenpose_transport::Message;
 use ravenpose_wire::{ARMS, CorrectedPose, flag};
 use sd_notify::NotifyState;
@@ -121,7 +121,8 @@ fn start(arguments: &Arguments) -> Result<ExitCode, String> {
     for problem in &missing {
         say(&format!("NOT REAL TIME: {problem}"));
     }
-    let standing = if missing.is_empty() { 0 } else { flag::NOT_REALTIME };
+    // Memory that the configuration leaves unlocked needs no permission, but the guarantee is as little there.
+    let standing = if missing.is_empty() && config.lock_memory { 0 } else { flag::NOT_REALTIME };
     let code = serve(&config, prepared, standing, arguments.test_hook);
     drop(latency);
     code
@@ -188,10 +189,10 @@ fn load_models(config: &Config) -> Result<Prepared, String> {
     let mut models = [none(), none()];
     for arm in 0..ARMS {
         let Some(sources) = &config.models[arm] else { continue };
-        let (model, name) = load_model(config, &files, &sources.position, NAMES[arm])?;
+        let (model, name) = load_model(config, &files, &sources.position, ARM_NAMES[arm])?;
         (models[arm].position, names[arm]) = (model, name);
         if let Some(source) = &sources.orientation {
-            let (model, name) = load_model(config, &files, source, &format!("orientation of the {}", NAMES[arm]))?;
+            let (model, name) = load_model(config, &files, source, &format!("orientation of the {}", ARM_NAMES[arm]))?;
             models[arm].orientation = model;
             names[arm] = format!("{}; orientation {name}", names[arm]);
         }
@@ -237,9 +238,10 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
     let shared = Arc::new(Shared::default());
     let (recorder, collector) = histogram::exchange();
     let (event_sender, events) = shared::events();
+    let (trouble, troubles) = watch::troubles();
     let cycle = Cycle::new(config.limits, prepared.models, config.allow_untrained, standing);
     let (ready, opened) = sync_channel(1);
-    let handle = spawn_loop(config, cycle, hook, (recorder, event_sender, shared.clone()), ready)?;
+    let handle = spawn_loop(config, cycle, hook, (recorder, event_sender, shared.clone()), (ready, trouble))?;
     if !matches!(opened.recv(), Ok(Ok(()))) {
         return Err(match handle.join() {
             Ok(Err(message)) => message,
@@ -247,11 +249,8 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
         });
     }
     // From here on a panic ends the process at once: the controller then uses its own pose, and systemd starts us anew.
-    std::panic::set_hook(Box::new(|panic| {
-        say(&format!("internal error: {panic}"));
-        std::process::abort();
-    }));
-    let mut watch = Watch::new(config, shared, collector, events, prepared.names, standing == 0)?;
+    std::panic::set_hook(Box::new(|panic| abort(format!("internal error: {panic}"))));
+    let mut watch = Watch::new(config, shared, collector, (events, troubles), prepared.names, standing == 0)?;
     notify(&[NotifyState::Ready, NotifyState::Status("running")]);
     say(&format!("running; poses on {}, statistics in {}", CorrectedPose::SERVICE, watch.stats_path().display()));
     while !signals::wait(TICK) {
@@ -288,7 +287,7 @@ fn spawn_loop(
     cycle: Cycle<Estimate>,
     hook: Option<TestHook>,
     ends: (histogram::Recorder, EventSender, Arc<Shared>),
-    ready: SyncSender<Result<(), ()>>,
+    (ready, trouble): (SyncSender<Result<(), ()>>, SyncSender<String>),
 ) -> Result<Loop, String> {
     let config = config.clone();
     std::thread::Builder::new()
@@ -318,8 +317,10 @@ fn spawn_loop(
                     && !shared.stop.load(Relaxed)
                 {
                     let text = error.to_string();
-                    if text != said {
-                        say(&format!("the link cannot be opened anew: {text}; it is tried again"));
+                    // Said by the ordinary thread: a log that hangs holds up nobody.
+                    if text != said
+                        && trouble.try_send(format!("the link cannot be opened anew: {text}; it is tried again")).is_ok()
+                    {
                         said = text;
                     }
                     std::thread::sleep(TICK);

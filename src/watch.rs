@@ -1,11 +1,11 @@
 //! The ordinary thread beside the loop: watchdog, log, statistics, and an eye on the link.
 
-use crate::config::Config;
+use crate::config::{ARM_NAMES, Config};
 use crate::histogram::{Collector, Histograms};
 use crate::report::{Log, Stats};
-use crate::say;
 use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
+use crate::{abort, say};
 use ravenpose_transport::{Message, Probe, Settings};
 use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag, flag_names};
 use sd_notify::NotifyState;
@@ -13,10 +13,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// The arms' names, as the configuration has them.
-pub const NAMES: [&str; ARMS] = ["gold", "green"];
 /// How often the ordinary thread looks.
 pub const TICK: Duration = Duration::from_millis(30);
 /// Ticks without a heartbeat after which the loop is stuck: 180 ms on a real-time machine. Counted in ticks of this thread, so that
@@ -26,11 +25,18 @@ const STUCK_TICKS: u32 = 6;
 const STUCK_TICKS_DEGRADED: u32 = 167;
 /// How often statistics are written and the link is probed.
 const SECOND: Duration = Duration::from_secs(1);
+/// What the loop says while it has no link; more than a few lines a second nobody reads.
+const TROUBLES: usize = 4;
 const REMOVED: &str = "the shared files were removed under the service (RemoveIPC, a tmp cleaner?)";
 /// For this long after the link was opened anew it is opened again if newcomers still do not find it.
 const REOPEN_AGAIN: Duration = Duration::from_secs(20);
 /// How long the last files may take.
 const WRITE_MAX: Duration = Duration::from_millis(500);
+
+/// For what the loop says while it has no link, so that a log that hangs does not hold it up.
+pub fn troubles() -> (SyncSender<String>, Receiver<String>) {
+    sync_channel(TROUBLES)
+}
 
 /// The ordinary thread's view of the running service.
 pub struct Watch {
@@ -38,6 +44,8 @@ pub struct Watch {
     pub shared: Arc<Shared>,
     collector: Collector,
     events: EventReceiver,
+    /// What the loop says while it has no link.
+    troubles: Receiver<String>,
     interval: Histograms,
     total: Histograms,
     writer: Writer,
@@ -56,6 +64,10 @@ pub struct Watch {
     accepted: u64,
     /// Messages refused until then.
     refused: u64,
+    /// Failures to receive until then.
+    receive_failures: u64,
+    /// A publisher could not be connected, and nothing has come since.
+    deaf: bool,
     unreachable: u32,
     /// When the link was first opened anew after it had worked.
     reopened: Option<Instant>,
@@ -72,7 +84,7 @@ impl Watch {
         config: &Config,
         shared: Arc<Shared>,
         collector: Collector,
-        events: EventReceiver,
+        (events, troubles): (EventReceiver, Receiver<String>),
         names: [String; ARMS],
         realtime: bool,
     ) -> Result<Self, String> {
@@ -85,6 +97,7 @@ impl Watch {
             shared,
             collector,
             events,
+            troubles,
             interval: Histograms::new(),
             total: Histograms::new(),
             writer: Writer::start(stats_path.clone(), log)
@@ -101,6 +114,8 @@ impl Watch {
             settings: config.transport.clone(),
             accepted: 0,
             refused: 0,
+            receive_failures: 0,
+            deaf: false,
             probe: Probe::open(&config.transport).map_err(|error| error.to_string())?,
             unreachable: 0,
             reopened: None,
@@ -119,6 +134,9 @@ impl Watch {
         self.check_heartbeat();
         while let Some(event) = self.events.dequeue() {
             self.lines.take(&event);
+        }
+        for line in self.troubles.try_iter().take(TROUBLES) {
+            self.writer.line(line);
         }
         if self.lines.due() {
             self.lines.print(&self.writer);
@@ -148,11 +166,10 @@ impl Watch {
         if reopening && self.still < STUCK_TICKS_DEGRADED {
             notify(&[NotifyState::Watchdog]);
         } else if self.still >= self.stuck_ticks {
-            say(&format!(
+            abort(format!(
                 "the loop is stuck: no turn for {} ms; ending, so that it is started anew",
                 TICK.as_millis() * u128::from(self.still)
             ));
-            std::process::abort();
         }
     }
 
@@ -171,7 +188,7 @@ impl Watch {
         let (publishers, readers) = self.probe.count::<RavenState>();
         let (poses, _) = self.probe.count::<CorrectedPose>();
         let counters = self.shared.counters();
-        let (accepted, refused) = (counters[1], counters[7]);
+        let (accepted, refused, receive_failures) = (counters[1], counters[7], counters[11]);
         let flows = std::mem::replace(&mut self.accepted, accepted) != accepted;
         // What is refused does arrive; the log says so by itself.
         let refuses = std::mem::replace(&mut self.refused, refused) != refused;
@@ -189,15 +206,22 @@ impl Watch {
         let settling = self.reopened.is_some_and(|reopened| reopened.elapsed() < REOPEN_AGAIN);
         if self.unreachable == 2 && flows && !settling {
             // What works is left alone: it would only be interrupted.
-            say(
-                "the shared files were removed under the service (RemoveIPC, a tmp cleaner?); the running link goes on, newcomers cannot join until the control process is restarted",
-            );
+            self.writer
+                .line(format!("{REMOVED}; the running link goes on, newcomers cannot join until the control process is restarted"));
         } else if self.unreachable >= 2 && (!flows || settling) && !self.shared.reopen.load(Relaxed) {
             self.unreachable = 0;
             if !settling {
                 self.reopened = Some(Instant::now());
             }
             self.writer.line(format!("{REMOVED}; opening the link anew"));
+            self.shared.reopen.store(true, Relaxed);
+        }
+        // Nothing tries again to connect a publisher before one comes or goes; another reader does.
+        let failed = std::mem::replace(&mut self.receive_failures, receive_failures) != receive_failures;
+        self.deaf = failed || (self.deaf && !flows);
+        if self.deaf && !flows && publishers > 0 && !self.shared.reopen.load(Relaxed) {
+            self.deaf = false;
+            self.writer.line("the control process could not be connected; opening the link anew".to_owned());
             self.shared.reopen.store(true, Relaxed);
         }
         let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
@@ -300,7 +324,7 @@ fn describe(event: &Event) -> String {
     match *event {
         Event::Arm { arm, status, flags, sequence } => {
             let names: Vec<_> = flag_names(flags).collect();
-            format!("{} arm: {} [{}] at state {sequence}", NAMES[arm], ArmStatus::name(status), names.join(" "))
+            format!("{} arm: {} [{}] at state {sequence}", ARM_NAMES[arm], ArmStatus::name(status), names.join(" "))
         }
         Event::Source { id, sequence } => format!("control process {id:016x} from state {sequence}"),
         Event::Lost { total, sequence } => format!("states missing before {sequence}; {total} in all"),

@@ -39,10 +39,14 @@ impl Socket {
 }
 
 fn start(world: &World, arguments: &[&str]) -> (Socket, service::Process) {
+    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
+    start_with(world, arguments, log.into())
+}
+
+fn start_with(world: &World, arguments: &[&str], log: std::process::Stdio) -> (Socket, service::Process) {
     let path = world.dir.0.join("notify");
     let socket = Socket(UnixDatagram::bind(&path).expect("socket"));
     let config = world.config(CONFIG);
-    let log = std::fs::File::create(world.dir.0.join("service.log")).expect("log");
     let child = world.service(&config).args(arguments).env("NOTIFY_SOCKET", &path).stderr(log).spawn().expect("service");
     (socket, service::Process(child))
 }
@@ -109,6 +113,62 @@ fn a_stuck_loop_is_no_longer_fed() {
         // F43. The machine may hold up one of them; not all.
         assert!(soonest <= 250_000_000, "{soonest} ns");
     });
+}
+
+/// F35, F43. A log that nobody reads holds up neither a loop that works nor the end of one that does not.
+#[test]
+fn a_log_that_hangs_holds_up_neither_the_watchdog_nor_the_end() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("mute");
+        let (unread, log) = std::io::pipe().expect("a pipe");
+        let filler = log.try_clone().expect("a pipe");
+        let (socket, mut service) = start_with(&world, &["--test-hook", "3000:1:3600000000"], log.into());
+        socket.hear_until("READY=1");
+        // After its last line at the start, a few looks later.
+        (0..5).for_each(|_| socket.hear_until("WATCHDOG=1"));
+        let full = fill(filler);
+        let _publisher = world.role("a_log_that_hangs_holds_up_neither_the_watchdog_nor_the_end", "publisher");
+        let reader = world.poses();
+        // Each arm's first pose, its first correction and more are worth lines; 3000 poses come all the same, then a loop that is stuck.
+        let (begun, mut poses, mut feeds) = (Instant::now(), 0, 0);
+        while service.0.try_wait().expect("status").is_none() {
+            feeds += u64::from(socket.hear(Duration::from_millis(5)).is_some_and(|text| text.contains("WATCHDOG=1")));
+            while reader.next().expect("pose").is_some() {
+                poses += 1;
+            }
+            assert!(begun.elapsed() < PATIENCE, "a log that hangs keeps a stuck loop alive; {poses} poses");
+        }
+        assert!(!full.is_finished(), "the log does not hang");
+        assert_eq!(service.end().signal(), Some(libc::SIGABRT));
+        assert!(poses > 1500 && feeds > 12, "{poses} poses and {feeds} feeds in 3 s");
+        drop(unread);
+        let _ = full.join();
+    });
+}
+
+/// Writes until nothing more goes in, and stays so until nobody can read any more.
+fn fill(mut pipe: std::io::PipeWriter) -> std::thread::JoinHandle<()> {
+    use std::io::Write;
+    let written = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let count = std::sync::Arc::clone(&written);
+    let filling = std::thread::spawn(move || {
+        while pipe.write_all(b"x").is_ok() {
+            count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        }
+    });
+    let mut before = usize::MAX;
+    loop {
+        std::thread::sleep(Duration::from_millis(100));
+        let now = written.load(std::sync::atomic::Ordering::Relaxed);
+        if now == before && now > 0 {
+            return filling;
+        }
+        before = now;
+    }
 }
 
 /// F35. Statistics are written aside and renamed; a pipe in that place, which nobody reads, holds up whoever opens it.

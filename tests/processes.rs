@@ -482,6 +482,28 @@ fn a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing() {
     });
 }
 
+/// And it hears no controller that comes. It says so, and hears it as soon as there is one again.
+#[test]
+fn a_controller_that_cannot_be_connected_is_told_and_then_heard() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("deaf");
+        let config = world.config("allow_untrained = true\nallow_degraded = true");
+        let service = world.start(&config, &[]);
+        let limit = limit_descriptors(&service, Some(1));
+        let _publisher = world.role("a_controller_that_cannot_be_connected_is_told_and_then_heard", "publisher");
+        world.until("a line", || world.log().contains("link failures: 1 receiving"));
+        limit_descriptors(&service, limit);
+        world.until("states", || counter(&world, "accepted") > 100);
+        assert!(counter(&world, "receive_failures") > 0);
+        // For this, or because the probe had no descriptor either.
+        assert!(world.log().contains("opening the link anew"), "{}", world.log());
+    });
+}
+
 /// States that this pose's service never answered.
 fn unanswered(pose: &CorrectedPose) -> u64 {
     pose.skipped + pose.lost
@@ -507,7 +529,7 @@ fn judged(reader: &Reader<CorrectedPose>, last: &mut Option<CorrectedPose>) -> u
 #[test]
 fn a_process_that_was_stopped_goes_on_with_the_newest_state_and_without_a_burst() {
     const PAUSE: Duration = Duration::from_millis(300);
-    /// Poses beyond one a millisecond: the cycle that was cut in two, the newest of what waited, a robot that catches up. A backlog is 64.
+    /// Poses beyond one a millisecond: the cycle that was cut in two, the newest of what waited, a robot that catches up. A backlog is 256.
     const SLACK: u64 = 20;
     if role().as_deref() == Some("publisher") {
         publish_forever();

@@ -130,8 +130,7 @@ fn million() -> ! {
     static CALLS: AtomicU64 = AtomicU64::new(u64::MAX);
     static VALID: AtomicU64 = AtomicU64::new(0);
     lock_memory_or_skip();
-    let (finish, finished) = std::sync::mpsc::channel::<()>();
-    std::thread::spawn(move || {
+    let turning = std::thread::spawn(move || {
         let settings = Settings::from_env();
         let (mut runner, _collector, _events, _) = runner(&settings, Wait::Spin);
         let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
@@ -171,18 +170,16 @@ fn million() -> ! {
         // No way out of the filter: stay here until the process ends.
         loop {
             std::hint::spin_loop();
-            if false {
-                let _ = finish.send(());
-            }
         }
     });
     while THREAD.load(SeqCst) == 0 {
+        assert!(!turning.is_finished(), "the loop did not begin");
         std::thread::sleep(Duration::from_millis(10));
     }
     let before = faults_of(THREAD.load(SeqCst));
     GO.store(true, SeqCst);
-    let _ = &finished;
     while !DONE.load(SeqCst) {
+        assert!(!turning.is_finished(), "the loop ended");
         std::thread::sleep(Duration::from_millis(10));
     }
     let after = faults_of(THREAD.load(SeqCst));
@@ -215,7 +212,7 @@ fn minute() -> ! {
     let settings = Settings::from_env();
     let (ready, opened) = std::sync::mpsc::channel();
     let link = settings.clone();
-    std::thread::spawn(move || {
+    let turning = std::thread::spawn(move || {
         let (mut runner, collector, _events, shown) = runner(&link, Wait::Sleep);
         if let Err(missing) = realtime::pin(CORE).and_then(|()| realtime::set_fifo(80)) {
             println!("skipped: {missing}");
@@ -246,6 +243,7 @@ fn minute() -> ! {
     let mut sequence = 0;
     let mut measured = histogram::Histograms::new();
     while !DONE.load(SeqCst) {
+        assert!(!turning.is_finished(), "the loop ended");
         sequence += 1;
         writer.send(&state(sequence)).expect("state sent");
         if before.is_none() && THREAD.load(SeqCst) != 0 {

@@ -176,6 +176,26 @@ fn with_allow_degraded_it_goes_on_and_every_message_says_so() {
     });
 }
 
+/// Leaving memory unlocked is a choice that needs no permission; the messages tell.
+#[test]
+fn memory_that_is_left_unlocked_is_told() {
+    if role().as_deref() == Some("publisher") {
+        publish_forever();
+    }
+    despite_stops(|| {
+        let world = World::new("unlocked");
+        let config = world.config(&format!("{CONFIG}\n[loop]\nlock_memory = false"));
+        let _service = world.start(&config, &[]);
+        let reader = world.poses();
+        let _publisher = world.role("memory_that_is_left_unlocked_is_told", "publisher");
+        world.until("a pose", || {
+            let Some(pose) = reader.next().expect("pose") else { return false };
+            assert_ne!(pose.arm[0].flags & ravenpose_wire::flag::NOT_REALTIME, 0);
+            true
+        });
+    });
+}
+
 #[test]
 fn a_rejected_model_is_flagged_where_that_is_allowed() {
     if role().as_deref() == Some("publisher") {

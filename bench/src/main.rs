@@ -96,6 +96,9 @@ fn main() -> ExitCode {
         }
     };
     let only = std::env::var("RAVENPOSE_BENCH_ONLY").ok();
+    if write && only.is_some() {
+        return ended(Err("--write replaces the whole page; leave RAVENPOSE_BENCH_ONLY unset".to_owned()));
+    }
     ended(Parts::wanted(full, only.as_deref()).and_then(|parts| measure(&parts, full, write)))
 }
 

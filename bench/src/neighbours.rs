@@ -274,7 +274,7 @@ fn robot(
         writer.prepare();
         let handed_over = now_ns();
         let answer = reader
-            .wait(sent + PATIENCE_NS, 0, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
+            .wait(sent + PATIENCE_NS, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
             .map_err(failed)?;
         let read = now_ns();
         if let Some(seen) = seen.get_mut(holds.load(Relaxed)) {

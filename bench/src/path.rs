@@ -200,7 +200,7 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
             handed_over.push(now_ns() - sent);
         }
         let answer = reader
-            .wait(sent + PATIENCE_NS, 0, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
+            .wait(sent + PATIENCE_NS, |reader| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence)))
             .map_err(|error| error.to_string())?;
         let took = now_ns() - sent;
         if sequence > WARM_UP {
@@ -280,7 +280,7 @@ fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<
                 writer.send(&state).map_err(told)?;
                 let answered =
                     |reader: &Reader<CorrectedPose>| Ok(reader.latest()?.filter(|pose| pose.source_sequence == sequence));
-                let answer = reader.wait(sent + TRIP_MAX_NS, 0, answered).map_err(told)?;
+                let answer = reader.wait(sent + TRIP_MAX_NS, answered).map_err(told)?;
                 if answer.is_some() && sequence > FIRST_TRIPS {
                     halves.push((now_ns() - sent) / 2);
                 }

@@ -29,6 +29,8 @@ pub struct Publisher {
     bell: Bell,
     source_id: u64,
     next_sequence: u64,
+    /// The number that the state on loan was given.
+    lent: u64,
 }
 
 impl Publisher {
@@ -36,7 +38,7 @@ impl Publisher {
         let writer = Writer::open(settings).map_err(|error| refused(&error))?;
         let bell = Bell::open(settings).map_err(|error| refused(&error))?;
         writer.prepare();
-        Ok(Self { loan: None, writer, bell, source_id: source_id(), next_sequence: 1 })
+        Ok(Self { loan: None, writer, bell, source_id: source_id(), next_sequence: 1, lent: 0 })
     }
 
     pub(crate) fn loan(&mut self) -> Result<*mut RavenState, Code> {
@@ -48,6 +50,7 @@ impl Publisher {
         let mut state = RavenState::new();
         state.source_id = self.source_id;
         state.sequence = self.next_sequence;
+        self.lent = self.next_sequence;
         // SAFETY: `place` is the loaned message, aligned and large enough, and nobody else sees it yet.
         unsafe { place.write(state) };
         self.loan = Some(loan);
@@ -58,6 +61,10 @@ impl Publisher {
         let Some(mut loan) = self.loan.take() else { return Code::Loan };
         // SAFETY: `loan` wrote a whole state there; C may have changed its numbers, and any bits are valid in them.
         let state = unsafe { &mut *loan.as_mut_ptr() };
+        if state.sequence == self.lent {
+            // Not set by the caller: others may have been published meanwhile, and a number that falls is a new source.
+            state.sequence = 0;
+        }
         self.complete(state);
         // SAFETY: initialised, see above.
         let sent = unsafe { loan.send_written() };

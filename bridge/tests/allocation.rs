@@ -39,7 +39,7 @@ fn million() -> ! {
         println!("skipped: memory cannot be locked here, so that a page fault proves nothing; raise the memlock limit");
         std::process::exit(0);
     }
-    std::thread::spawn(|| {
+    let calling = std::thread::spawn(|| {
         let settings = Settings::from_env();
         let states: Reader<RavenState> = Reader::open(&settings, 1).expect("the service's end");
         let poses: Writer<CorrectedPose> = Writer::open(&settings).expect("the service's end");
@@ -107,11 +107,13 @@ fn million() -> ! {
         }
     });
     while THREAD.load(SeqCst) == 0 {
+        assert!(!calling.is_finished(), "the calls did not begin");
         std::thread::sleep(Duration::from_millis(5));
     }
     let before = faults_of(THREAD.load(SeqCst));
     GO.store(true, SeqCst);
     while !DONE.load(SeqCst) {
+        assert!(!calling.is_finished(), "the calls ended");
         std::thread::sleep(Duration::from_millis(5));
     }
     let after = faults_of(THREAD.load(SeqCst));

@@ -1,10 +1,10 @@
 //! How late does this machine wake a thread? Measured as cyclictest does.
-//!
-//! This module contains `unsafe`: the scheduler and clock calls of the measuring thread.
 
 use super::{Finding, Level};
-use rustix::thread::{ClockId as SleepClock, CpuSet, clock_nanosleep_absolute, sched_setaffinity};
-use rustix::time::{ClockId, Timespec, clock_gettime};
+use crate::realtime;
+use ravenpose_transport::now_ns;
+use rustix::thread::{ClockId, clock_nanosleep_absolute};
+use rustix::time::Timespec;
 use std::time::Duration;
 
 const PERIOD_NS: i64 = 1_000_000;
@@ -77,9 +77,9 @@ pub fn measure_wakeup(duration: Duration, core: Option<usize>, priority: i32) ->
         .name("ravenpose-wake".to_owned())
         .spawn(move || {
             if let Some(core) = core {
-                pin(core).map_err(|cause| WakeupError::Core(core, cause))?;
+                realtime::run_on(core).map_err(|cause| WakeupError::Core(core, cause))?;
             }
-            let fifo = set_fifo(priority);
+            let fifo = realtime::set_fifo(priority).is_ok();
             // Touched before the first sample is taken, so that none of them pays for a page fault.
             let mut lateness = vec![u64::MAX; count];
             sample(&mut lateness).map_err(WakeupError::Sleep)?;
@@ -91,32 +91,12 @@ pub fn measure_wakeup(duration: Duration, core: Option<usize>, priority: i32) ->
         .unwrap_or(Err(WakeupError::Panicked))
 }
 
-fn pin(core: usize) -> std::io::Result<()> {
-    if core >= CpuSet::MAX_CPU {
-        return Err(std::io::ErrorKind::InvalidInput.into());
-    }
-    let mut set = CpuSet::new();
-    set.set(core);
-    Ok(sched_setaffinity(None, &set)?)
-}
-
-fn set_fifo(priority: i32) -> bool {
-    let parameter = libc::sched_param { sched_priority: priority };
-    // SAFETY: `parameter` is a valid sched_param for the duration of the call; 0 names the calling thread.
-    unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) == 0 }
-}
-
-fn now_ns() -> i64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec * SECOND_NS + now.tv_nsec
-}
-
 fn sample(lateness: &mut [u64]) -> std::io::Result<()> {
     let mut wanted = now_ns() + PERIOD_NS;
     for slot in lateness {
         let until = Timespec { tv_sec: wanted / SECOND_NS, tv_nsec: wanted % SECOND_NS };
         loop {
-            match clock_nanosleep_absolute(SleepClock::Monotonic, &until) {
+            match clock_nanosleep_absolute(ClockId::Monotonic, &until) {
                 Ok(()) => break,
                 Err(rustix::io::Errno::INTR) => {}
                 Err(cause) => return Err(cause.into()),
@@ -172,6 +152,7 @@ impl Wakeup {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use rustix::thread::CpuSet;
 
     #[test]
     fn quantiles_are_nearest_rank() {

@@ -2,7 +2,7 @@
 //!
 //! This module contains `unsafe`: handing over a message that C has written in place.
 
-use crate::{Settings, TransportError, now_ns, room, sleep_until_ns};
+use crate::{Settings, TransportError, now_ns, room};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::Subscriber;
@@ -159,6 +159,19 @@ fn retried<R>(
     open()
 }
 
+/// Counts a connection that cannot be made: iceoryx2 by itself would say it only in a log that is off here.
+fn counted(failures: &AtomicU64, cause: &DegradationCause) -> DegradationAction {
+    if matches!(cause, DegradationCause::FailedToEstablishConnection) {
+        failures.fetch_add(1, Relaxed);
+    }
+    DegradationAction::Ignore
+}
+
+/// What was counted since this was last asked. Nearly always nothing, and then only read.
+fn take_count(failures: &AtomicU64) -> u64 {
+    if failures.load(Relaxed) == 0 { 0 } else { failures.swap(0, Relaxed) }
+}
+
 /// The one publisher of a message type.
 pub struct Writer<T: Message> {
     /// Taken while there was nothing else to do; dropped before the port.
@@ -182,13 +195,8 @@ impl<T: Message> Writer<T> {
         let publisher = opened
             .service
             .publisher_builder()
-            // The others go on being served; iceoryx2 by itself would say it only in a log that is off here.
-            .set_degradation_handler(move |cause, _| {
-                if matches!(cause, DegradationCause::FailedToEstablishConnection) {
-                    count.fetch_add(1, Relaxed);
-                }
-                DegradationAction::Ignore
-            })
+            // The others go on being served.
+            .set_degradation_handler(move |cause, _| counted(&count, &cause))
             .max_loaned_samples(LOANED_MAX)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
@@ -255,8 +263,7 @@ impl<T: Message> Writer<T> {
     /// How often a reader could not be connected since this was last asked: no descriptor free, shared memory full. It gets nothing until
     /// readers come or go again, when it is tried once more.
     pub fn take_left_out(&self) -> u64 {
-        // Nearly always zero, and then only read.
-        if self.left_out.load(Relaxed) == 0 { 0 } else { self.left_out.swap(0, Relaxed) }
+        take_count(&self.left_out)
     }
 
     /// Readers that want this message now, left out or not.
@@ -306,6 +313,8 @@ impl<T: Message> Loan<T> {
 /// A reader of a message type.
 pub struct Reader<T: Message> {
     subscriber: Subscriber<ipc::Service, T, ()>,
+    /// Publishers that could not be connected and that nobody was told of yet.
+    unreached: Arc<AtomicU64>,
     opened: Opened<T>,
     depth: usize,
 }
@@ -319,35 +328,44 @@ impl<T: Message> Reader<T> {
         let opened = open::<T>(settings)?;
         let depth = depth.clamp(1, DEPTH_MAX);
         room::require(ROOM_OF_SERVICE + ROOM_OF_QUEUE)?;
-        let subscriber = opened.service.subscriber_builder().buffer_size(depth).create().map_err(|cause| TransportError::Full {
-            service: T::SERVICE,
-            role: "reader",
-            cause: format!("{cause:?}"),
-        })?;
-        // As for the writer.
+        let unreached = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&unreached);
+        let subscriber = opened
+            .service
+            .subscriber_builder()
+            .buffer_size(depth)
+            .set_degradation_handler(move |cause, _| counted(&count, &cause))
+            .create()
+            .map_err(|cause| TransportError::Full { service: T::SERVICE, role: "reader", cause: format!("{cause:?}") })?;
+        // What fails here is counted, and said when taking.
         let _ = subscriber.update_connections();
         room::take(settings)?;
-        Ok(Self { subscriber, opened, depth })
+        Ok(Self { subscriber, unreached, opened, depth })
     }
 
     /// Gives every waiting message to `take`, oldest first, at most the queue's depth of them; returns how many.
     ///
     /// # Errors
-    /// [`TransportError::Receive`] when a new publisher's memory cannot be mapped; what came before was taken.
+    /// [`TransportError::Receive`] when a new publisher cannot be connected (no descriptor free, memory that cannot be mapped); what came
+    /// before was taken. It is said once, and not tried again before publishers come or go: open another reader.
     pub fn drain(&self, mut take: impl FnMut(&T)) -> Result<usize, TransportError> {
         for count in 0..self.depth {
             match self.subscriber.receive() {
                 Ok(Some(sample)) => take(sample.payload()),
-                Ok(None) => return Ok(count),
+                Ok(None) => return self.all_reached().map(|()| count),
                 Err(_) => return Err(TransportError::Receive { service: T::SERVICE }),
             }
         }
         Ok(self.depth)
     }
 
-    /// Is a message waiting? Also `true` when looking failed: then taking it tells why.
+    fn all_reached(&self) -> Result<(), TransportError> {
+        if take_count(&self.unreached) == 0 { Ok(()) } else { Err(TransportError::Receive { service: T::SERVICE }) }
+    }
+
+    /// Is a message waiting? Also `true` when a publisher could not be connected: then taking tells so.
     pub fn has_message(&self) -> bool {
-        self.subscriber.has_samples().unwrap_or(true)
+        self.subscriber.has_samples().unwrap_or(true) || self.unreached.load(Relaxed) > 0
     }
 
     /// The oldest waiting message, if any.
@@ -356,7 +374,8 @@ impl<T: Message> Reader<T> {
     /// As [`Reader::drain`].
     pub fn next(&self) -> Result<Option<T>, TransportError> {
         match self.subscriber.receive() {
-            Ok(sample) => Ok(sample.map(|sample| *sample.payload())),
+            Ok(Some(sample)) => Ok(Some(*sample.payload())),
+            Ok(None) => self.all_reached().map(|()| None),
             Err(_) => Err(TransportError::Receive { service: T::SERVICE }),
         }
     }
@@ -371,29 +390,23 @@ impl<T: Message> Reader<T> {
         Ok(newest)
     }
 
-    /// Waits until `ready` accepts a result of `take`, polling every `poll_ns` (0: without a pause), until `deadline_ns`.
+    /// Polls without a pause until `take` gives something, at most until `deadline_ns`.
     ///
     /// # Errors
     /// As [`Reader::drain`].
     pub fn wait<R>(
         &self,
         deadline_ns: i64,
-        poll_ns: i64,
         mut take: impl FnMut(&Self) -> Result<Option<R>, TransportError>,
     ) -> Result<Option<R>, TransportError> {
         loop {
             if let Some(result) = take(self)? {
                 return Ok(Some(result));
             }
-            let now = now_ns();
-            if now >= deadline_ns {
+            if now_ns() >= deadline_ns {
                 return Ok(None);
             }
-            if poll_ns > 0 {
-                sleep_until_ns((now + poll_ns).min(deadline_ns));
-            } else {
-                std::hint::spin_loop();
-            }
+            std::hint::spin_loop();
         }
     }
 
