@@ -147,21 +147,31 @@ fn write(outcome: &Outcome, out: &Path) -> Result<(), String> {
 /// last one. The status is that of the report.
 fn watched(model: &RobotModel, given: &Given, options: &Options, out: &Path) -> Result<ExitCode, String> {
     let mut told: Option<Outcome> = None;
+    let mut fault = None;
     for end_s in watch::ends(&given.real) {
         let real = watch::newest(&given.real, end_s);
         let from_s = real.time_s().and_then(|time| time.first().copied()).unwrap_or(end_s);
         let sim = given.sim.as_ref().map(|(sim, hash)| (watch::newest(sim, end_s), hash.clone()));
         let (id, real_sha256) = (given.id.clone(), given.real_sha256.clone());
         let window = Given { id, real, real_sha256, notes: given.notes.clone(), sim };
-        let outcome = quietly(model, &[window], options)?;
-        if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {}\n", gap_report::headlines(&outcome.report).join(" "))) {
+        let outcome = quietly(model, &[window], options);
+        let said = match &outcome {
+            Ok(outcome) => gap_report::headlines(&outcome.report).join(" "),
+            // A minute in which the arm stands is no end of the watch.
+            Err(why) => format!("not looked at: {why}"),
+        };
+        if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {said}\n")) {
             break;
         }
-        if differs(&outcome) || !told.as_ref().is_some_and(differs) {
-            told = Some(outcome);
+        match outcome {
+            Ok(outcome) if differs(&outcome) || !told.as_ref().is_some_and(differs) => told = Some(outcome),
+            Ok(_) => {}
+            Err(why) => fault = Some(why),
         }
     }
-    let outcome = told.ok_or_else(|| format!("{}: has no column t_s; --watch needs the time of each row", given.real.name))?;
+    let outcome = told.ok_or_else(|| {
+        fault.unwrap_or_else(|| format!("{}: has no column t_s; --watch needs the time of each row", given.real.name))
+    })?;
     write(&outcome, out)?;
     say!("{}", out.join("report.html").display());
     Ok(status(outcome.report.status))

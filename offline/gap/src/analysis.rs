@@ -80,6 +80,14 @@ pub enum AnalysisError {
         /// The first run.
         run: String,
     },
+    /// Torques alone, of joints that hardly move.
+    #[error(
+        "{run}: no joint moves more than 0.01 rad or 1 mm, so that its torque says nothing; move every joint through some of its range"
+    )]
+    Standing {
+        /// The first run.
+        run: String,
+    },
     /// No channel that all have.
     #[error(
         "nothing to compare: {lacks}; give runs that all have the same channel, and a simulation with the recording's, or leave --sim out to \
@@ -121,6 +129,19 @@ pub struct Outcome {
     pub(crate) elsewhere: f64,
 }
 
+/// Where the simulations of some runs could be compared sample by sample, and that of another cannot.
+fn only_taught(runs: &[Both], comparable: &[bool]) -> Option<DataQuality> {
+    let at_odds = runs.iter().zip(comparable).find(|(_, comparable)| !**comparable).filter(|_| comparable.contains(&true));
+    at_odds.map(|((real, _), _)| {
+        let message = format!(
+            "the simulation of {} moves otherwise than the recording, so that no simulation is compared sample by sample: they only say what to \
+             believe of the robot; leave that run out to compare the others with theirs",
+            real.id
+        );
+        DataQuality::new("same_motion", Level::Warn, message).run(real.id.clone())
+    })
+}
+
 /// What the search and the judgement have in common; for the parts that put it into words.
 pub struct Found<'a> {
     /// The robot.
@@ -151,6 +172,8 @@ pub struct Found<'a> {
     pub beside: &'a [Vec<f64>],
     /// A controller that is not the simulation's.
     pub controller: Option<crate::controller::Changed>,
+    /// Was the nominal model learnt from a simulation? Not from one whose input is reversed.
+    pub learnt: bool,
     /// Is there something that the library does not explain?
     pub unmodelled: bool,
     /// What explained most, and not what was held out.
@@ -191,7 +214,7 @@ const LIBRARY_BYTES: f64 = 24_000.0;
 const HELD_OUT: f64 = 1.0 / 3.0;
 /// Length of a block, s; long runs take longer ones.
 const BLOCK_S: f64 = 1.5;
-/// Most blocks.
+/// Most blocks; of many runs two for each all the same.
 const BLOCKS: f64 = 40.0;
 /// Most effects of a table of points.
 const MOST_OF_POINTS: usize = 9;
@@ -321,6 +344,8 @@ fn analyse_with(
     let mut runs = Vec::new();
     // Simulations that move otherwise, or at another time, than the recording.
     let mut apart: Vec<Run> = Vec::new();
+    // Of each run: may its simulation be compared sample by sample?
+    let mut comparable = vec![false; given.len()];
     let mut from_recording = false;
     let mut wrong = Vec::new();
     for (k, one) in given.iter().enumerate() {
@@ -342,6 +367,7 @@ fn analyse_with(
                 if recorded || !alike {
                     apart.push(sim.clone());
                 }
+                comparable[k] = !recorded && alike;
                 if !recorded && !alike && one.sim.is_some() {
                     let named = |run: &Run| Run { id: one.id.clone(), ..run.clone() };
                     wrong.extend(comparable::elsewhere(&robot, &named(&real), &sim));
@@ -385,17 +411,19 @@ fn analyse_with(
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     // With torques of their own they say what to believe of the robot, but not sample by sample.
-    let apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
+    let mut apart: Vec<Run> = if apart.iter().all(|sim| sim.torque.is_some()) { apart } else { Vec::new() };
     let from_recording = from_recording && !apart.is_empty();
     if !apart.is_empty() {
-        for run in &mut runs {
-            run.1 = None;
+        // All or none: residuals of which some hold the simulation's own and others do not are no one problem.
+        quality.extend(only_taught(&runs, &comparable));
+        for (run, comparable) in runs.iter_mut().zip(&comparable) {
+            apart.extend(run.1.take().filter(|_| *comparable));
         }
     }
     let by_lab: Vec<bool> = given.iter().map(|one| one.sim.is_some()).collect();
     let in_common = channels::in_common(&mut runs, &by_lab);
     quality.extend(in_common.map_err(|lacks| AnalysisError::OneSided { lacks })?);
-    let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0) };
+    let band = if from_recording { Band::LEARNT } else { Band::of(&runs[0].0, &robot) };
     let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
     let (train, held) = split(runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
@@ -406,7 +434,7 @@ fn analyse_with(
     progress("smoothing");
     let pair = |(real, sim): Both| {
         let (real, sim) = parallel::both(|| Motion::new(real, band), || sim.map(|sim| Motion::new(sim, band)));
-        Pair { real, sim }
+        Pair::new(real, sim)
     };
     let train: Vec<Pair> = parallel::map(train, pair);
     let held: Vec<Pair> = parallel::map(held, pair);
@@ -431,7 +459,8 @@ fn analyse_with(
     };
     let mut problem = prior.put_on(problem);
     if problem.cells.is_empty() {
-        return Err(AnalysisError::NoChannel { run: given[0].id.clone() });
+        // A torque is there, of joints that stand; the other channels are compared at rest too.
+        return Err(AnalysisError::Standing { run: given[0].id.clone() });
     }
     let (floors, floor_methods): (Vec<f64>, Vec<FloorMethod>) = floors::floors(&problem).into_iter().unzip();
     // What the model gets wrong itself, and the forms of its own effects do, is no further effect.
@@ -474,7 +503,7 @@ fn analyse_with(
         let motors = family.form == "joint encoders" && estimate.coefficients[0] < 0.0;
         family.physics == "measurement_delay" && (motors || LATE_TORQUES.contains(&family.form))
     });
-    let simulated_by_lab = given.iter().all(|one| one.sim.is_some());
+    let simulated_by_lab = given.iter().all(|one| one.sim.is_some()) && !sims.is_empty();
     let found = Found {
         robot: &robot,
         nominal: &nominal,
@@ -490,9 +519,10 @@ fn analyse_with(
         floor_methods: &floor_methods,
         beside: &beside,
         controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
+        learnt: !sims.is_empty(),
         unmodelled,
         refused: refused.as_ref(),
-        // Only against a lab's own simulation, whose floors are known.
+        // Only against a lab's own simulation: of a robot file it is known too roughly how far it is off.
         unexplained: (refused.is_none() && !unmodelled && !from_recording && simulated_by_lab)
             .then(|| match &sized(&answer.effects, &estimates)[..] {
                 [] => unexplained::left(&problem, &floors),
@@ -532,7 +562,7 @@ fn analyse_with(
 
 /// Is the torque of a run that of rigid bodies with drives, as a simulator's is but for its noise?
 fn of_a_model(robot: &Robot, sim: &Run) -> bool {
-    let motion = Motion::new(sim.clone(), Band::of(sim));
+    let motion = Motion::new(sim.clone(), Band::of(sim, robot));
     let nominal = Nominal::learn(robot, std::slice::from_ref(&motion));
     let n = robot.joint_count();
     2 * (0..n).filter(|j| nominal.not_understood(*j) > OF_A_MODEL).count() <= n

@@ -43,7 +43,7 @@ impl Corrected {
 /// The given model with what was missing.
 pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], Band)) -> Corrected {
     let mut before = given.clone();
-    if runs.iter().any(|one| one.sim.is_some()) {
+    if found.learnt && runs.iter().any(|one| one.sim.is_some()) {
         believe(&mut before, found);
         before.model_error = known::model_error(&before, found.robot, runs, band);
     }

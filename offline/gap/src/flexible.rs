@@ -109,9 +109,12 @@ pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none
         .map(|(c, (nats, _))| (c, *nats))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|(_, nats)| *nats > 0.0);
-    let mut depends_on: Vec<&'static str> = cell.map_or_else(Vec::new, |(c, _)| by_cell[c].1.clone());
-    depends_on.dedup();
-    depends_on.truncate(3);
+    let mut depends_on: Vec<&'static str> = Vec::new();
+    for name in cell.map_or(&[][..], |(c, _)| &by_cell[c].1) {
+        if depends_on.len() < 3 && !depends_on.contains(name) {
+            depends_on.push(name);
+        }
+    }
     let library_nats = scorer.gain(none, &library).nats;
     Ceiling {
         library_nats,

@@ -138,6 +138,8 @@ fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
             let own = || beside(physics, named, all);
             rms(own().map(|one| one.value)) * (own().count() as f64).sqrt()
         }
+        // Where a phase is counted from says nothing: what it is on the average.
+        _ if named.is_phase() => std::f64::consts::FRAC_PI_2,
         _ => named.value,
     }
 }
@@ -293,8 +295,9 @@ fn of_candidates(
             let values = of(&wide.coefficients);
             let replicates: Vec<Vec<Named>> = wide.without.iter().map(|c| of(c)).collect();
             let spread = |k: usize| -> f64 {
-                let mean = replicates.iter().map(|r| r[k].value).sum::<f64>() / blocks;
-                replicates.iter().map(|r| (r[k].value - mean).powi(2)).sum::<f64>().sqrt()
+                let of: Vec<f64> = replicates.iter().map(|r| r[k].near(values[k].value)).collect();
+                let mean = of.iter().sum::<f64>() / blocks;
+                of.iter().map(|x| (x - mean).powi(2)).sum::<f64>().sqrt()
             };
             let (physics, form) = (candidate.family.physics, candidate.family.form);
             let parameters = values

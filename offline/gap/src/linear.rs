@@ -2,17 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Minimises `|A x - b|² + |diag(ridge)(x - prior)|²`; `ridge` in the unit of the columns.
-pub fn ridge(a: &DMatrix<f64>, b: &DVector<f64>, ridge: &[f64], prior: &DVector<f64>) -> DVector<f64> {
-    let mut gram = a.transpose() * a;
-    let mut right = a.transpose() * (b - a * prior);
-    for (i, weight) in ridge.iter().enumerate() {
-        gram[(i, i)] += weight * weight;
-    }
-    solve(&mut gram, &mut right);
-    prior + right
-}
-
 /// Sum of the products of two series.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -44,16 +33,4 @@ pub fn solve(gram: &mut DMatrix<f64>, right: &mut DVector<f64>) {
     for i in 0..n {
         right[i] /= scale[i];
     }
-}
-
-/// Inverse of a symmetric positive definite matrix by the same scaling; none where it is singular.
-pub fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = gram.nrows();
-    let scale: Vec<f64> = (0..n).map(|i| if gram[(i, i)] > 0.0 { gram[(i, i)].sqrt() } else { 1.0 }).collect();
-    let mut scaled = DMatrix::from_fn(n, n, |i, j| gram[(i, j)] / (scale[i] * scale[j]));
-    for i in 0..n {
-        scaled[(i, i)] += 1e-12;
-    }
-    let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j])))
 }

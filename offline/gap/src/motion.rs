@@ -1,6 +1,7 @@
 //! Smoothed signals of one run: what every regressor is built from.
 
 use crate::filter::Window;
+use crate::robot::Robot;
 use crate::run::Run;
 
 /// How signals are smoothed and sampled.
@@ -20,11 +21,11 @@ impl Band {
     /// What a model learnt from another recording can follow: half power at 2.7 Hz.
     pub const LEARNT: Self = Self { sigma_s: 0.05, step_s: 0.02 };
 
-    /// Fast motion: half power at 67 Hz, every row.
+    /// Fast motion: half power at 67 Hz, 500 rows a second.
     pub const FAST: Self = Self { sigma_s: 0.002, step_s: 0.002 };
 
-    /// The band in which a run moves: the slow one, unless most of its motion is faster.
-    pub fn of(run: &Run) -> Self {
+    /// The band in which a run moves: the slow one, unless most of the motion of every joint that moves is faster.
+    pub fn of(run: &Run, robot: &Robot) -> Self {
         let lost = |series: &[f64]| {
             let quick = Window::new(Self::FAST.sigma_s.max(1.5 * run.dt_s), run.dt_s).apply(series, 0);
             let slow = Window::new(Self::SLOW.sigma_s, run.dt_s).apply(series, 0);
@@ -32,7 +33,8 @@ impl Band {
             let size = |x: &mut dyn Iterator<Item = f64>| crate::nominal::rms(x);
             size(&mut quick.iter().zip(&slow).map(|(q, s)| q - s)) > 0.7 * size(&mut quick.iter().map(|q| q - mean))
         };
-        if !run.points && run.position.iter().all(|series| lost(series)) { Self::FAST } else { Self::SLOW }
+        let moving = || run.position.iter().enumerate().filter(|(j, series)| robot.moves(*j, series)).map(|(_, series)| series);
+        if !run.points && moving().next().is_some() && moving().all(|series| lost(series)) { Self::FAST } else { Self::SLOW }
     }
 
     /// The same for a recording with a period of `dt_s`.
@@ -217,6 +219,25 @@ pub struct State {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A joint that swings so many times a second for 4 s.
+    fn swings(hz: f64) -> Vec<f64> {
+        (0..4000_i32).map(|i| 0.2 * (std::f64::consts::TAU * hz * f64::from(i) * 1e-3).sin()).collect()
+    }
+
+    #[test]
+    fn a_joint_that_stands_has_no_say_in_how_fast_a_run_moves() {
+        let of = |hz: &[f64]| {
+            let mut robot = Robot::of(&simulator::RobotModel::load("raven2-nominal").expect("built in"));
+            robot.prismatic = vec![false; hz.len()];
+            let position = hz.iter().map(|hz| swings(*hz)).collect();
+            Band::of(&Run { position, ..Run::of_one_joint(&swings(1.0)) }, &robot)
+        };
+        assert_eq!(of(&[30.0, 30.0]), Band::FAST);
+        assert_eq!(of(&[0.0, 30.0]), Band::FAST, "the first stands");
+        assert_eq!(of(&[1.0, 30.0]), Band::SLOW, "the first moves slowly");
+        assert_eq!(of(&[0.0, 0.0]), Band::SLOW);
+    }
 
     #[test]
     fn rows_whose_window_touches_a_hole_are_left_out() {

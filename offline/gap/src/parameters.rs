@@ -3,6 +3,7 @@
 use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, STRIBECK_RANGE, TOOL_TWIST, TWISTED};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
+use std::f64::consts::TAU;
 
 /// A named number with its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +14,19 @@ pub struct Named {
     pub unit: &'static str,
     /// Value.
     pub value: f64,
+}
+
+impl Named {
+    /// Is it an angle of a wave, which comes round?
+    pub(crate) fn is_phase(&self) -> bool {
+        matches!(self.name, "phase" | "phi")
+    }
+
+    /// The value; of a phase the turn of it that lies nearest to another one.
+    pub(crate) fn near(&self, other: f64) -> f64 {
+        let turns = if self.is_phase() { ((other - self.value) / TAU).round() } else { 0.0 };
+        self.value + turns * TAU
+    }
 }
 
 /// Parameters of a candidate with these coefficients and this shape (which may differ from its own), joint side.
@@ -161,5 +175,19 @@ pub(crate) fn beside(
             Some(("constant torque, of an amplifier whose counts are not known", theta[theta.len() - 1], effort))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Named, TAU};
+
+    #[test]
+    fn a_phase_is_near_another_one_round_the_turn() {
+        let of = |name, value| Named { name, unit: "rad", value };
+        assert!((of("phase", -3.1).near(3.1) - (TAU - 3.1)).abs() < 1e-12);
+        assert!((of("phi", 3.1).near(-3.1) + TAU - 3.1).abs() < 1e-12);
+        assert!((of("phase", 1.0).near(-1.0) - 1.0).abs() < 1e-12);
+        assert!((of("a", -3.1).near(3.1) + 3.1).abs() < 1e-12, "no other number comes round");
     }
 }

@@ -94,6 +94,38 @@ pub struct Pair {
     pub sim: Option<Motion>,
 }
 
+impl Pair {
+    /// Both of one run. A frame of the recording's camera with none of the simulation's near is left out: some with what the simulation does and some
+    /// without are no one residual.
+    pub fn new(mut real: Motion, sim: Option<Motion>) -> Self {
+        if let Some(frames) = sim.as_ref().and_then(Frames::of) {
+            real.tip_rows.retain(|i| frames.around(*i).is_some());
+        }
+        Self { real, sim }
+    }
+}
+
+/// Samples, at most, between two frames between which a line is drawn.
+const FRAMES_APART: usize = 100;
+
+/// Samples with a measured tip.
+struct Frames(Vec<usize>);
+
+impl Frames {
+    fn of(motion: &Motion) -> Option<Self> {
+        let [x, ..] = motion.run.tip.as_ref()?;
+        Some(Self((0..x.len()).filter(|i| x[*i].is_finite()).collect()))
+    }
+
+    /// The frames before and after a sample, which are one where there is one at it.
+    fn around(&self, i: usize) -> Option<[usize; 2]> {
+        let after = self.0.partition_point(|frame| *frame < i);
+        let last = *self.0.get(after)?;
+        let first = if last == i { last } else { self.0[after.checked_sub(1)?] };
+        (last - first <= FRAMES_APART).then_some([first, last])
+    }
+}
+
 /// Least RMS of an effect in each cell: what is smaller may be the error of the nominal model. All 0 where that is not known.
 #[derive(Debug, Clone, Default)]
 pub struct Practical {
@@ -148,16 +180,9 @@ pub struct Problem<'a> {
 
 /// Times that an effect has to exceed what the nominal model leaves of the robot that it was learnt from.
 const BEYOND: f64 = 2.0;
-/// Travel below which a joint stands, rad and m.
-const STANDING: f64 = 0.01;
-const STANDING_M: f64 = 0.001;
-
 /// Does a joint move, in some run, so that its torque says more than where it hangs?
 fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
-    pairs.iter().any(|pair| {
-        let (low, high) = crate::nominal::range(pair.real.position[j].iter().copied());
-        high - low > if robot.prismatic[j] { STANDING_M } else { STANDING }
-    })
+    pairs.iter().any(|pair| robot.moves(j, &pair.real.position[j]))
 }
 
 impl<'a> Problem<'a> {
@@ -300,18 +325,28 @@ impl<'a> Problem<'a> {
         let mut ws = Workspace::new(&self.robot.arm);
         for (r, pair) in self.pairs.iter().enumerate() {
             let tip = pair.real.run.tip.as_ref().expect("checked by the caller");
-            let sim = pair.sim.as_ref().filter(|sim| sim.run.tip.is_some());
+            let sim = pair.sim.as_ref().and_then(|sim| Some((sim, sim.run.tip.as_ref()?, Frames::of(sim)?)));
+            let mut off = |motion: &Motion, seen: &[Vec<f64>; 3], i: usize| {
+                let expected = self.tip(&mut ws, motion, i);
+                [0, 1, 2].map(|a| seen[a][i] - expected[a])
+            };
             for &i in &pair.real.tip_rows {
-                let expected = self.tip(&mut ws, &pair.real, i);
-                let beside = sim.and_then(|sim| {
-                    let seen = sim.run.tip.as_ref()?;
-                    let expected = self.tip(&mut ws, sim, i);
-                    let off = [0, 1, 2].map(|a| seen[a][i] - expected[a]);
-                    off[0].is_finite().then_some(off)
-                });
-                for (a, cell) in cells.iter_mut().enumerate() {
+                let mut left = off(&pair.real, tip, i);
+                // What the simulation is off by changes slowly, its tip does not: the line is drawn between the former.
+                if let Some((sim, seen, [first, last])) =
+                    sim.as_ref().and_then(|(sim, seen, frames)| Some((sim, seen, frames.around(i)?)))
+                {
+                    let share = if last > first { (i - first) as f64 / (last - first) as f64 } else { 0.0 };
+                    for (frame, share) in [(first, 1.0 - share), (last, share)] {
+                        if share > 0.0 {
+                            let beside = off(sim, seen, frame);
+                            left.iter_mut().zip(beside).for_each(|(left, off)| *left -= share * off);
+                        }
+                    }
+                }
+                for (cell, left) in cells.iter_mut().zip(left) {
                     cell.rows.push((r, i));
-                    cell.residual.push(tip[a][i] - expected[a] - beside.map_or(0.0, |off| off[a]));
+                    cell.residual.push(left);
                 }
             }
         }

@@ -11,10 +11,10 @@ const HALVINGS: usize = 7;
 const SECANTS: usize = 4;
 /// First step of an edge, of its time.
 const EDGE_S: f64 = 0.1;
-/// The same of a memory of the whole motion.
-const SHARP_ROUNDS: usize = 10;
-/// Rounds over all numbers of a shape, at most, and over those of which one makes up for another: how slow, and since when.
+/// Rounds over all numbers of a shape, at most; over those of a memory of the whole motion; and over those of which one makes up for another:
+/// how slow, and since when.
 const ROUNDS: usize = 6;
+const SHARP_ROUNDS: usize = 10;
 const ROUNDS_IN_VALLEYS: usize = 12;
 /// How often choices are made anew.
 const CHOICES: usize = 4;

@@ -81,7 +81,17 @@ pub struct Robot {
     pub with_wrist: Option<Kinematics>,
 }
 
+/// Travel below which a joint stands, rad and m.
+const STANDING: f64 = 0.01;
+const STANDING_M: f64 = 0.001;
+
 impl Robot {
+    /// Does a joint with these positions move?
+    pub(crate) fn moves(&self, j: usize, position: &[f64]) -> bool {
+        let (low, high) = crate::nominal::range(position.iter().copied());
+        high - low > if self.prismatic[j] { STANDING_M } else { STANDING }
+    }
+
     /// A robot from its URDF.
     ///
     /// # Errors

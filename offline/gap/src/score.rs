@@ -61,8 +61,6 @@ impl Grams {
 pub struct Fit {
     /// Coefficients.
     pub coefficients: Vec<f64>,
-    /// Their covariance, innovations taken for white.
-    pub covariance: DMatrix<f64>,
     /// Held-out squared error of the innovations per cell and block.
     pub held_out: Vec<Vec<f64>>,
     /// Squared error per cell with all blocks in the fit.
@@ -246,13 +244,11 @@ impl<'a> Scorer<'a> {
             grams.sums.iter().map(|cell| cell.iter().fold(DMatrix::zeros(p + 1, p + 1), |a, b| a + b)).collect();
         let mut weights: Vec<f64> = (0..cells).map(|c| self.rows(c) / totals[c][(p, p)].max(1e-300)).collect();
         let mut coefficients = DVector::zeros(p);
-        let mut normal = DMatrix::zeros(p, p);
         let mut within = vec![0.0; cells];
         for _ in 0..3 {
-            let (gram, right) = weighted(&totals, &weights, p);
+            let (mut gram, right) = weighted(&totals, &weights, p);
             coefficients = right;
-            normal.copy_from(&gram);
-            linear::solve(&mut gram.clone(), &mut coefficients);
+            linear::solve(&mut gram, &mut coefficients);
             for c in 0..cells {
                 within[c] = squared_error(&totals[c], &coefficients, p);
                 weights[c] = self.rows(c) / within[c].max(1e-300);
@@ -278,8 +274,7 @@ impl<'a> Scorer<'a> {
             }
             without.push(theta.as_slice().to_vec());
         }
-        let covariance = linear::inverse(&normal).unwrap_or_else(|| DMatrix::from_diagonal_element(p, p, f64::INFINITY));
-        Fit { coefficients: coefficients.as_slice().to_vec(), covariance, held_out, within, without }
+        Fit { coefficients: coefficients.as_slice().to_vec(), held_out, within, without }
     }
 
     /// Negative log likelihood of a fit on all rows, nats, up to a constant.
@@ -298,12 +293,6 @@ impl<'a> Scorer<'a> {
         self.whitened[cell].len() as f64
     }
 
-    /// Gain of `better` over `base` on what was held out, per cell, nats.
-    pub fn gain_by_cell(&self, base: &Fit, better: &Fit) -> Vec<f64> {
-        let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>().max(1e-300);
-        (0..base.held_out.len()).map(|c| 0.5 * self.rows(c) / self.correlation[c] * (sum(base, c) / sum(better, c)).ln()).collect()
-    }
-
     /// Gain of `better` over `base` on what was held out.
     pub fn gain(&self, base: &Fit, better: &Fit) -> Gain {
         self.gain_in(base, better, |_| true)
@@ -311,21 +300,15 @@ impl<'a> Scorer<'a> {
 
     /// The same, its errors those over the blocks where the difference shows: the others say nothing of its scatter.
     pub fn gain_in(&self, base: &Fit, better: &Fit, shows: impl Fn(usize) -> bool) -> Gain {
+        let cells = 0..base.held_out.len();
+        let sums = |fit: &Fit| -> Vec<Without> { cells.clone().map(|c| Without::of(&fit.held_out[c])).collect() };
+        let (of_base, of_better) = (sums(base), sums(better));
         let total = |skip: Option<usize>| -> f64 {
-            (0..base.held_out.len())
-                .map(|c| {
-                    let sum = |fit: &Fit| -> f64 {
-                        fit.held_out[c]
-                            .iter()
-                            .enumerate()
-                            .filter(|(b, _)| Some(*b) != skip)
-                            .map(|(_, e)| e)
-                            .sum::<f64>()
-                            .max(1e-300)
-                    };
-                    0.5 * self.rows(c) / self.correlation[c] * (sum(base) / sum(better)).ln()
-                })
-                .sum()
+            let of_cell = |c: usize| {
+                let sum = |of: &[Without]| of[c].sum(skip).max(1e-300);
+                0.5 * self.rows(c) / self.correlation[c] * (sum(&of_base) / sum(&of_better)).ln()
+            };
+            cells.clone().map(of_cell).sum()
         };
         let blocks = 0..self.problem.block_count;
         let left: Vec<f64> = blocks.clone().map(|b| total(Some(b))).collect();
@@ -345,6 +328,31 @@ impl<'a> Scorer<'a> {
         };
         let ranks = signed_ranks(&of_blocks);
         Gain { nats, error, least, explained, ranks }
+    }
+}
+
+/// Sums of a series up to each place and from each on: the whole without one of its parts, as exact as the whole.
+struct Without {
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+impl Without {
+    fn of(series: &[f64]) -> Self {
+        let up_to = |values: &mut dyn Iterator<Item = &f64>| -> Vec<f64> {
+            let sums = values.scan(0.0, |sum, x| {
+                *sum += x;
+                Some(*sum)
+            });
+            [0.0].into_iter().chain(sums).collect()
+        };
+        let (before, mut after) = (up_to(&mut series.iter()), up_to(&mut series.iter().rev()));
+        after.reverse();
+        Self { before, after }
+    }
+
+    fn sum(&self, skip: Option<usize>) -> f64 {
+        skip.map_or(self.after[0], |b| self.before[b] + self.after[b + 1])
     }
 }
 

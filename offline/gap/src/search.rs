@@ -4,8 +4,6 @@ mod at_once;
 mod by_run;
 mod likeliest;
 
-use std::sync::Arc;
-
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
@@ -137,8 +135,6 @@ pub struct Answer<'a> {
     pub next: Option<Scored>,
     /// Scores of this problem.
     pub scorer: Scorer<'a>,
-    /// Everything that could have been said.
-    pub families: Vec<Arc<Family>>,
 }
 
 impl Answer<'_> {
@@ -254,7 +250,7 @@ pub fn search<'p>(
     let grams = search.grams(&chosen, None);
     let fit = search.scorer.fit(&grams);
     search.scorer.temper(&grams, &fit);
-    Answer { effects, grams, fit, none, next, scorer: search.scorer, families }
+    Answer { effects, grams, fit, none, next, scorer: search.scorer }
 }
 
 impl Search<'_, '_> {

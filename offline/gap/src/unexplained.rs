@@ -104,9 +104,12 @@ pub(crate) fn mostly(problem: &Problem, floors: &[f64], effects: &[Sized]) -> Op
     cells.filter(|c| problem.cells[*c].channel == Channel::Transmission).find_map(of_cell)
 }
 
+/// Rows of each run, at most, that a frequency is told from: 80 s. Each frequency asks all of them.
+const ROWS: usize = 4096;
+
 /// The frequency at which a cell is strongest, Hz, of as many as its longest run tells apart.
 fn strongest(problem: &Problem, c: usize) -> f64 {
-    let runs = by_run(problem, c);
+    let runs: Vec<&[f64]> = by_run(problem, c).into_iter().map(|run| &run[..run.len().min(ROWS)]).collect();
     let longest = runs.iter().map(|run| run.len()).max().unwrap_or(0);
     let motion = &problem.pairs[0].real;
     let period_s = motion.step() as f64 * motion.run.dt_s;
@@ -125,7 +128,8 @@ fn strongest(problem: &Problem, c: usize) -> f64 {
 /// What nothing explains, in the cell where it stands highest above its floor; none where all stay near theirs.
 pub(crate) fn left(problem: &Problem, floors: &[f64]) -> Option<Unexplained> {
     let size = |c: usize| rms(problem.cells[c].residual.iter().copied());
-    let above = |c: usize| size(c) / floors[c].max(1e-300);
+    // What the model leaves of its own simulation is nothing that the robot has.
+    let above = |c: usize| size(c) / floors[c].max(problem.practical.any[c]).max(1e-300);
     let highest = |of: &dyn Fn(usize) -> f64, from: f64| {
         let heights = (0..problem.cells.len()).filter(|c| problem.cells[*c].channel != Channel::EndEffector).map(|c| (c, of(c)));
         heights.filter(|(_, height)| *height > from).max_by(|a, b| a.1.total_cmp(&b.1))

@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{primary, report};
+use common::{outcome, primary, report};
+use gap::analysis::Outcome;
 use gap_report::Level;
 
 const REAL: &str = "raven2-uiuc/real_first_two_thirds.csv";
@@ -28,10 +29,12 @@ fn a_model_without_friction_lacks_dry_friction_on_three_joints() {
 
 #[test]
 fn a_simulation_with_its_input_reversed_is_told_first() {
-    let Some(report) = report("raven2-frictionless.toml", &[REAL], &[SIM]) else { return };
+    let Some(Outcome { report, corrected, .. }) = outcome("raven2-frictionless.toml", &[REAL], &[SIM]) else { return };
     let first = &report.data_quality[0];
     assert_eq!((first.check.as_str(), first.level), ("input_sign", Level::Fail));
     assert!(first.message.contains("the simulation"), "{}", first.message);
     assert!(report.summary.starts_with("The simulation's input has the wrong sign"), "{}", report.summary);
     assert_eq!(primary(&report, "coulomb_friction").len(), 3);
+    // What such a simulation differs by is no error of the model.
+    assert!(!corrected.expect("a corrected model").contains("[model_error]"));
 }

@@ -27,6 +27,16 @@ fn altered(folder: &Folder, case: &mut Case, change: impl Fn(usize, &str, usize,
 }
 
 #[test]
+fn a_ripple_is_told_although_the_held_out_run_has_no_motors() {
+    let folder = Folder::new("ripple-held");
+    let (mut case, _) = made(&folder, "ripple-held", &[wanted("torque_ripple", Some(2), &[("amp", 1.0), ("order", 2.0)])], 24.0);
+    case.real[1] =
+        with_columns(&folder, "joints.csv", &case.real[1], |column, _, value| (!column.starts_with("mpos_")).then_some(value));
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(primary(&report)[0].physics.to_string(), "torque_ripple", "{}", report.summary);
+}
+
+#[test]
 fn a_spring_that_pulls_a_joint_back_has_no_name() {
     // A hose: it passed for a wrong ratio, or for a link of another weight.
     let folder = Folder::new("spring");

@@ -106,6 +106,30 @@ fn of_unequal_lengths_rates_and_starts_the_common_stretch_counts() {
 }
 
 #[test]
+fn a_camera_that_looks_at_other_times_than_the_simulations_is_compared_frame_by_frame() {
+    let folder = Folder::new("frames");
+    let case = made(&folder, "frames", &[wanted("link_geometry", Some(2), &[("d_length", 0.003)])], 12.0).0;
+    let whole = primary(&case.judged(&folder.file("whole")))[0].clone();
+    // A frame every 40 ms, beside every other one of the recording's camera: these must not be compared with it, and the others without.
+    let sparse = |row: usize, header: &[&str], cells: &mut Vec<String>| {
+        if row % 40 != 1 {
+            for column in ["truth_x_mm", "truth_y_mm", "truth_z_mm"] {
+                cells[at(header, column)].clear();
+            }
+        }
+        true
+    };
+    let sim = case.sim.iter().enumerate().map(|(k, path)| changed(&folder, &format!("frames_{k}.csv"), path, sparse)).collect();
+    let report = Case { sim, ..case }.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "link_geometry", "{}", report.summary);
+    let (found, before) = (parameter(first, "d_length").0, parameter(&whole, "d_length").0);
+    assert!((found - before).abs() < 0.001 * before.abs(), "{found}, {before} with all frames");
+    let (left, before) = (first.fit[0].after, whole.fit[0].after);
+    assert!((left - before).abs() < 0.005 * before, "{left} m left, {before} with all frames");
+}
+
+#[test]
 fn states_of_a_raven_and_their_table_are_analysed_alike() {
     let folder = Folder::new("formats");
     let effect = "physics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }";

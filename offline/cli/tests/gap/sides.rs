@@ -144,6 +144,29 @@ fn a_simulation_of_another_robot_or_of_other_commands_gives_no_verdict() {
 }
 
 #[test]
+fn a_simulation_that_moves_a_little_otherwise_takes_the_comparison_from_all_and_the_report_says_so() {
+    let folder = Folder::new("sides-otherwise");
+    let case = friction(&folder);
+    let turns = lines(&case.sim[0]).len() as f64;
+    // The shoulder swings half of its own travel beside what it was commanded to.
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let _ =
+        with_columns(&folder, "read.csv", &case.sim[0], |column, _, value| if column == "mpos_1_rad" { Some(value) } else { None });
+    for line in &lines(&folder.file("read.csv"))[1..] {
+        let value: f64 = line.parse().expect("a number");
+        (low, high) = (low.min(value), high.max(value));
+    }
+    let mut sim = case.sim.clone();
+    sim[0] = with_columns(&folder, "swings.csv", &case.sim[0], |column, row, value| {
+        let swing = 0.25 * (high - low) * (std::f64::consts::TAU * 3.0 * row as f64 / turns).sin();
+        Some(if column == "mpos_1_rad" { value + swing } else { value })
+    });
+    let report = Case { sim, real: case.real.clone(), robot: case.robot.clone() }.judged(&folder.file("out"));
+    let said = told(&report, "same_motion");
+    assert!(said.contains("real_1.csv.gz") && said.contains("leave that run out"), "{said}");
+}
+
+#[test]
 fn what_is_the_same_on_both_sides_is_not_complained_about() {
     let folder = Folder::new("sides-same");
     let case = friction(&folder);

@@ -1,6 +1,6 @@
 //! `gap --watch`: a recording of a running robot, a minute at a time.
 
-use crate::common::{Folder, errors, holds, named, near, ravenpose, text, with_effect};
+use crate::common::{Folder, done, errors, holds, named, near, ravenpose, text, with_effect};
 use gap_report::{Report, Status};
 
 /// What is said, window by window, of a RAVEN-II with an effect that was watched for 105 s, and the report that is left.
@@ -49,6 +49,28 @@ fn a_cable_that_creeps_is_told_in_every_minute_though_nobody_saw_it_begin() {
     let first = named(&report, "cable_creep", "elbow");
     holds(first, "J_k", 0.001, 0.3);
     holds(first, "T_k", 20.0, 0.5);
+}
+
+#[test]
+fn a_minute_in_which_the_arm_stands_is_no_end_of_the_watch() {
+    let folder = Folder::new("watch-stands");
+    let robot = folder.write("robot.toml", with_effect("physics = \"coulomb_friction\"\njoint = 1\nparameters = { f_c = 1.0 }"));
+    let (run, moving) = (folder.run("0.4", Some(&robot), &[]), folder.file("moving.csv"));
+    done(&["convert", text(&run), text(&moving), "--arm", "gold"]);
+    let table = std::fs::read_to_string(moving).expect("a table");
+    let mut rows: Vec<String> = table.lines().map(str::to_owned).collect();
+    // 70 s of what the last row says, at 50 Hz.
+    let (time, rest) = rows[rows.len() - 1].split_once(',').map(|(time, rest)| (time.to_owned(), rest.to_owned())).expect("cells");
+    let end_s: f64 = time.parse().expect("t_s first");
+    rows.extend((1..=70_000).map(|ms| format!("{:.3},{rest}", end_s + f64::from(ms) * 1e-3)));
+    let (real, out) = (folder.write("stands.csv", rows.join("\n") + "\n"), folder.file("out"));
+    let output = ravenpose(&["gap", "--watch", "--real", text(&real), "--out", text(&out)]);
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{words}{}", errors(&output));
+    assert!(words.lines().filter(|line| line.contains("dry friction")).count() > 0, "{words}");
+    assert!(words.lines().any(|line| line.contains("s: not looked at: ")), "{words}");
+    let report = std::fs::read_to_string(out.join("report.json")).expect("a report");
+    named(&serde_json::from_str(&report).expect("JSON"), "coulomb_friction", "shoulder");
 }
 
 #[test]

@@ -58,7 +58,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 }
 
 /// A wave so many times per turn of the motor, smoothed as the torque is: what turns fast is gone from both. Where the joint
-/// creeps or holds nothing is claimed: a standing wave is a constant, and many constants explain anything.
+/// creeps or holds nothing is claimed: a standing wave is a constant, and many constants explain anything. Nor in a run without its motors.
 fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64> {
     dictionary.smoothed(|r| {
         let motion = &dictionary.problem.pairs[r].real;
@@ -67,7 +67,7 @@ fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64>
         let wave = |motor: &Vec<Vec<f64>>| {
             motor[j].iter().zip(&motion.quick_velocity[j]).map(|(angle, v)| (order * angle + phase).sin() * moving(v)).collect()
         };
-        motion.run.motor.as_ref().map_or_else(Vec::new, wave)
+        motion.run.motor.as_ref().map_or_else(|| vec![0.0; motion.run.len()], wave)
     })
 }
 

@@ -32,7 +32,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             .penalised(2.0),
         );
     }
-    if problem.cell(Channel::Transmission, 0).is_some() {
+    if problem.has(Channel::Transmission) {
         // The joint encoders come late: A⁻¹m - q(t - d) grows by d dq/dt, on all joints alike.
         all.push(Family::fixed("measurement_delay", &[], "joint encoders", Channel::Transmission, &[bound], |d| {
             let velocity = |j: usize| d.at_grid(|r, i, _| d.problem.pairs[r].real.velocity[j][i]);
@@ -40,7 +40,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             vec![d.deflection(&velocities)]
         }));
     }
-    if problem.cell(Channel::JointTorque, 0).is_some() {
+    if problem.has(Channel::JointTorque) {
         // Late is all of it. What only the sign of dry friction says is how that turns, slowly or after a moment's sticking.
         let mut sources: Vec<(&'static str, Source)> = vec![(LATE_TORQUES[0], believed)];
         if problem.pairs.iter().all(|pair| pair.sim.as_ref().is_some_and(|sim| sim.torque.is_some())) {

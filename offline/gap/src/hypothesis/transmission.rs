@@ -241,7 +241,8 @@ fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f6
     for (row, &(r, i, k)) in dictionary.grid.iter().enumerate() {
         let motion = &dictionary.problem.pairs[r].real;
         let state = if k > 0 {
-            let keep = (-row_period(motion) / time_s).exp();
+            let passed_s = (i - motion.rows[k - 1]) as f64 * motion.run.dt_s;
+            let keep = (-passed_s / time_s).exp();
             keep * out[row - 1] + (1.0 - keep) * load[row]
         } else if motion.run.since_s > 0.0 {
             let seen = dictionary.grid[row..]
@@ -278,11 +279,6 @@ fn rate(dictionary: &Dictionary, series: &[f64]) -> Vec<f64> {
         (0..run.len()).map(at).collect()
     };
     dictionary.problem.pairs.iter().zip(hysteresis::parts(dictionary, series)).flat_map(of_run).collect()
-}
-
-/// Seconds between rows.
-fn row_period(motion: &crate::motion::Motion) -> f64 {
-    motion.rows.get(1).map_or(0.0, |second| (second - motion.rows[0]) as f64 * motion.run.dt_s)
 }
 
 /// Bends of a spring to the ground, over one deflection: those that depend on the way, and those that turn with it, over the first.

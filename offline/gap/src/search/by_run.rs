@@ -18,11 +18,10 @@ impl Search<'_, '_> {
     pub(super) fn windows(&self) -> Vec<Windows> {
         let pairs = &self.problem.pairs;
         let shortest = pairs.iter().map(|p| p.real.run.len() as f64 * p.real.run.dt_s).fold(f64::INFINITY, f64::min);
-        let at = |k: usize| shortest * k as f64 / EDGES as f64;
-        let edges: Vec<f64> = (1..EDGES).map(at).collect();
-        let ends = with_one_edge(&edges);
-        let both = (1..EDGES - 2).step_by(2).flat_map(|i| (i + 2..EDGES).step_by(2).map(move |j| [at(i), at(j)]));
-        let alike = ends.chain(both).map(Windows::alike);
+        let since = pairs.iter().map(|p| p.real.run.since_s).fold(f64::INFINITY, f64::min);
+        let edges: Vec<f64> = (1..EDGES).map(|k| since + shortest * k as f64 / EDGES as f64).collect();
+        let some_edges: Vec<f64> = edges.iter().copied().step_by(2).collect();
+        let alike = with_one_edge(&edges).chain(with_both_edges(&some_edges)).map(Windows::alike);
         let of_runs = |is_there: &dyn Fn(usize) -> bool| {
             let all: Vec<Window> = (0..pairs.len()).map(|run| if is_there(run) { ALWAYS } else { NEVER }).collect();
             Windows::each(&all)
