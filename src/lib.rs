@@ -19,6 +19,7 @@ pub mod load;
 pub mod memory;
 pub mod model;
 pub mod network;
+pub mod notify;
 pub mod phase;
 pub mod realtime;
 pub mod report;

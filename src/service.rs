@@ -5,14 +5,14 @@ use crate::correction::ArmModel;
 use crate::cycle::{ArmModels, Cycle};
 use crate::histogram::{self, Histograms};
 use crate::model::{self, Estimate, Loaded, ModelError};
+use crate::notify::{READY, STOPPING, notify};
 use crate::realtime::{self, Missing};
 use crate::runner::{Ended, Runner, TestHook, Waiting};
 use crate::shared::{self, EventSender, Shared};
-use crate::watch::{self, TICK, Watch, notify};
+use crate::watch::{self, TICK, Watch};
 use crate::{abort, say, signals};
 use ravenpose_transport::Message;
 use ravenpose_wire::{ARMS, CorrectedPose, flag};
-use sd_notify::NotifyState;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -251,7 +251,7 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
     // From here on a panic ends the process at once: the controller then uses its own pose, and systemd starts us anew.
     std::panic::set_hook(Box::new(|panic| abort(format!("internal error: {panic}"))));
     let mut watch = Watch::new(config, shared, collector, (events, troubles), prepared.names, standing == 0)?;
-    notify(&[NotifyState::Ready, NotifyState::Status("running")]);
+    notify(READY);
     say(&format!("running; poses on {}, statistics in {}", CorrectedPose::SERVICE, watch.stats_path().display()));
     while !signals::wait(TICK) {
         if handle.is_finished() {
@@ -264,7 +264,7 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
         }
         watch.tick();
     }
-    notify(&[NotifyState::Stopping]);
+    notify(STOPPING);
     watch.shared.stop.store(true, Relaxed);
     for _ in 0..STOP_TICKS {
         if handle.is_finished() {

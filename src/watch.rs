@@ -2,13 +2,13 @@
 
 use crate::config::{ARM_NAMES, Config};
 use crate::histogram::{Collector, Histograms};
+use crate::notify::{WATCHDOG, notify};
 use crate::report::{Log, Stats};
 use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
 use crate::{abort, say};
 use ravenpose_transport::{Message, Probe, Settings};
 use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag, flag_names};
-use sd_notify::NotifyState;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -157,14 +157,14 @@ impl Watch {
         if heartbeat != self.heartbeat {
             self.heartbeat = heartbeat;
             self.still = 0;
-            notify(&[NotifyState::Watchdog]);
+            notify(WATCHDOG);
             return;
         }
         self.still += 1;
         // Opening a link may take a second; a hang in it ends like any other.
         let reopening = self.shared.reopen.load(Relaxed);
         if reopening && self.still < STUCK_TICKS_DEGRADED {
-            notify(&[NotifyState::Watchdog]);
+            notify(WATCHDOG);
         } else if self.still >= self.stuck_ticks {
             abort(format!(
                 "the loop is stuck: no turn for {} ms; ending, so that it is started anew",
@@ -271,11 +271,6 @@ fn open_log(dir: &Path) -> Option<Log> {
     Log::create(dir)
         .map_err(|cause| say(&format!("{}: histograms cannot be written here ({cause}); set report.histogram_dir", dir.display())))
         .ok()
-}
-
-/// Tells systemd; without it this does nothing, and a failure must not end the service.
-pub fn notify(states: &[NotifyState]) {
-    let _ = sd_notify::notify(states);
 }
 
 /// At most one line per kind of event and second, with a count of what it stands for.
