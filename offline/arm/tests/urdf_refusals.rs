@@ -98,6 +98,10 @@ fn wrong_numbers_are_refused_with_line_and_element() {
     assert!(changed(r#"<axis xyz="0 0 1"/>"#, "<axis/>").contains("attribute `xyz` of <axis> is missing"));
     assert!(changed(r#"lower="-1" upper="2""#, r#"lower="3" upper="2""#).contains("lower 3 exceeds upper 2"));
     assert!(changed(r#"velocity="3""#, r#"velocity="-3""#).contains("velocity is negative"));
+    for what in ["damping", "friction"] {
+        let rubbed = changed(r#"<axis xyz="0 0 1"/>"#, &format!(r#"<axis xyz="0 0 1"/><dynamics {what}="-0.1"/>"#));
+        assert!(rubbed.contains(&format!("{what} is negative; correct it")), "{rubbed}");
+    }
     assert!(changed(r#"<parent link="a"/>"#, "").contains("joint two: <parent> is missing"));
     assert!(changed(r#" type="continuous""#, "").contains("joint two: attribute `type` of <joint> is missing"));
     assert!(changed(r#"<link name="b"/>"#, "<link/>").contains("line 5, link: attribute `name` of <link> is missing"));

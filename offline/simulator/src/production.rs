@@ -209,6 +209,11 @@ impl Player {
         Ok(())
     }
 
+    /// Are its arms somewhere? Where steps cannot follow what pulls at a joint its numbers grow without bound, and stay no numbers.
+    pub fn is_somewhere(&self) -> bool {
+        self.arms.iter().all(|playing| playing.simulation.state().is_finite())
+    }
+
     /// Offset that homing left on an arm, rad and m.
     pub fn homing_offset(&self, side: Side) -> Option<&Joints> {
         self.arms.iter().find(|playing| playing.arm.side == side).map(|playing| playing.simulation.homing_offset())

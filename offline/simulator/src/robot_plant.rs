@@ -6,7 +6,7 @@ use arm::{JOINTS, Motors, Raven2, Side};
 use crate::model::{Bound, Effect, Robot};
 use crate::physics::{LinkGeometry, Physics};
 use crate::plant::{
-    Between, CableLaw, Drive, DriveNumbers, Held, JOINTS_MAX, Method, Passive, Plant, PlantError, Rubbing, Stiction, Timed,
+    Between, CableLaw, Drive, DriveNumbers, Held, JOINTS_MAX, Method, Passive, Plant, PlantError, Rubbing, Stiction, Timed, Vector,
 };
 use crate::tool_axes::{FIRST, ToolAxes};
 
@@ -17,7 +17,15 @@ const TORQUE_REF_NM: [f64; JOINTS] = [0.15, 0.15, 0.1, 0.03, 0.03, 0.03, 0.03];
 const INSERTION: usize = 2;
 
 /// Rate times step up to which the explicit method is used: it is stable to 2.78, and the mass matrix changes with posture.
-pub(crate) const EXPLICIT_MAX: f64 = 2.0;
+const EXPLICIT_MAX: f64 = 2.0;
+
+/// Frequency times step up to which the explicit method follows a cable's vibration well.
+const EXPLICIT_PHASE_MAX: f64 = 1.0;
+
+/// Are steps of this length short enough for the explicit method, whatever effects come?
+pub(crate) fn is_explicit(plant: &mut Plant, joints: &Vector, step_s: f64) -> bool {
+    plant.fastest_rate(joints) * step_s < EXPLICIT_MAX && plant.fastest_frequency(joints) * step_s < EXPLICIT_PHASE_MAX
+}
 
 /// Effects that the three positioning joints can have, but not a tool axis, whose transmission is rigid.
 const NEEDS_A_CABLE: &str = "the cables of joints 4 to 7 are rigid here; on them this effect cannot be";
@@ -53,8 +61,11 @@ pub(crate) fn build(robot: &Robot, side: Side, homing_offset: &Motors) -> Result
     tool.at(0.0);
     let mut home = [0.0; JOINTS_MAX];
     home[..FIRST].copy_from_slice(&raven.plant().limits.home[..FIRST]);
-    let stable = plant.fastest_rate(&home) * integrator.substep_s < EXPLICIT_MAX;
-    let method = if integrator.method == "rk4" && stable { Method::Rk4 } else { Method::Rosenbrock };
+    let method = if integrator.method == "rk4" && is_explicit(&mut plant, &home, integrator.substep_s) {
+        Method::Rk4
+    } else {
+        Method::Rosenbrock
+    };
     plant.set_step(method, integrator.substep_s);
     Ok((plant, tool))
 }

@@ -121,6 +121,9 @@ impl Simulation {
         self.rest_at(motors);
         let mut all = [0.0; JOINTS];
         all[..FIRST].copy_from_slice(&speeds[..FIRST]);
+        if let Some(tool) = speeds.get(FIRST..JOINTS) {
+            self.tool.turn_at(tool);
+        }
         self.state.speeds[..FIRST].copy_from_slice(&speeds[..FIRST]);
         self.state.rates[..FIRST].copy_from_slice(&self.arm.transmission.joints(&all)[..FIRST]);
     }

@@ -41,6 +41,11 @@ impl ToolAxes {
         self.joints = None;
     }
 
+    /// Lets its motors turn at speeds, rad/s.
+    pub(crate) fn turn_at(&mut self, speeds: &[f64]) {
+        self.speeds.copy_from_slice(speeds);
+    }
+
     /// Makes room for the memories of effects that were just added.
     pub(crate) fn grow_memories(&mut self) {
         for (warmth, drive) in self.warmth.iter_mut().zip(&self.drives) {
@@ -98,7 +103,7 @@ impl ToolAxes {
             let k2_angle = speed - 2.0 * k1_angle + GAMMA * h * k2;
             self.angles[i] += h * (1.5 * k1_angle + 0.5 * k2_angle);
             self.speeds[i] += h * (1.5 * k1 + 0.5 * k2);
-            for (warmth, (drift, _)) in self.warmth[i].iter_mut().zip(&drive.thermal) {
+            for (warmth, (drift, _)) in self.warmth[i].iter_mut().zip(&drive.thermal).filter(|(_, (drift, _))| drift.on) {
                 *warmth += h * drift.effect.rate(applied / drive.nominal.torque_ref_nm, *warmth);
             }
         }

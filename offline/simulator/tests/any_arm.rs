@@ -139,3 +139,15 @@ fn an_arm_follows_its_commands_within_its_limits_with_assumed_gains() {
         assert!(worst[0] < 0.03 && worst[1] < 0.03 && worst[2] < 0.01, "{connection:?}: {worst:?}");
     }
 }
+
+#[test]
+fn a_rigid_motor_turns_as_fast_as_its_angle_says_whatever_its_ratio() {
+    let robot = robot(Connection::Rigid);
+    let effect = "physics = \"transmission_ratio\"\njoint = 2\nparameters = { e = 0.1 }";
+    let more = RobotModel::from_toml(&format!("{}\n[[effect]]\n{effect}\n", robot.to_toml()), None).expect("a robot");
+    let cycles = run(&robot, more.effects());
+    let slope = |k: usize| (cycles[k + 1].motors[1] - cycles[k - 1].motors[1]) / 2e-3;
+    let pairs = || (100..1900).map(|k| (cycles[k].speeds[1], slope(k)));
+    let found = pairs().map(|(speed, slope)| speed * slope).sum::<f64>() / pairs().map(|(_, slope)| slope * slope).sum::<f64>();
+    assert!((found - 1.0).abs() < 0.01, "{found} of the angle's own speed");
+}

@@ -215,3 +215,33 @@ fn the_nominal_robot_is_too_perfect_and_the_worn_one_is_off_by_millimetres() {
     println!("tip off by: nominal {nominal:.2} mm RMS, worn {all:.2} mm RMS over eight homings {worn:.2?}");
     assert!((2.0..8.0).contains(&all), "{all} mm");
 }
+
+/// A second of motion of a robot with these effects, with the method that the simulator chooses by itself.
+fn chosen(effects: &str) -> Vec<CycleOfArm> {
+    let robot = format!("schema = \"ravenpose-robot/1\"\nname = \"x\"\nbase = \"raven2-nominal\"\n{effects}");
+    let robot = Robot::from_toml(&robot).expect("a robot");
+    let trajectory = teleoperation(5, start(), &WORKSPACE, 1.0);
+    let mut simulation = Simulation::new(&robot, Side::Gold, 1, &start()).expect("robot");
+    (0..1000).map(|k| simulation.tick(&Command::Joints(trajectory.at(f64::from(k) * 1e-3)))).collect()
+}
+
+#[test]
+fn whatever_an_effect_brings_the_steps_follow_it() {
+    let quiet = chosen("");
+    for effect in [
+        // Dampers and springs that explicit steps of a quarter of a millisecond cannot follow.
+        "physics = \"cable_stretch\"\njoint = 3\nparameters = { k = 2000.0, d = 9000.0 }",
+        "physics = \"cable_stretch\"\njoint = 2\nparameters = { k = 560.0, d = 5000.0 }",
+        "physics = \"cable_hysteresis\"\njoint = 3\nparameters = { a = 0.5, k = 2e7, z_m = 1e-4 }",
+        // Together more than all of the load: no drive pushes by itself.
+        "physics = \"load_dependent_friction\"\njoint = 2\nparameters = { mu_l = 0.9 }\n[[effect]]\nphysics = \"load_dependent_friction\"\njoint = 2\nparameters = { mu_l = 0.9 }",
+    ] {
+        let with = chosen(&format!("[[effect]]\n{effect}\n"));
+        for (k, (with, quiet)) in with.iter().zip(&quiet).enumerate() {
+            for j in 0..3 {
+                let off = (with.truth.joints[j] - quiet.truth.joints[j]).abs();
+                assert!(off < if j == 2 { 0.03 } else { 0.2 }, "{effect}: joint {} is {off} off after {k} ms", j + 1);
+            }
+        }
+    }
+}

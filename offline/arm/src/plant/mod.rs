@@ -116,6 +116,24 @@ impl Plant {
         positive("transmission.gear", &[self.transmission.gear_big, self.transmission.gear_small])?;
         positive("motor.torque_constant_nm_a", &self.motor.torque_constant_nm_a)?;
         positive("motor.dac_per_amp", &self.motor.dac_per_amp.map(f64::from))?;
+        positive("motor.inertia_capstan", &self.motor.inertia_capstan)?;
+        positive("tool_axes.inertia_capstan", &self.tool_axes.inertia_capstan)?;
+        positive("cable.joint_radius_m", &self.cable.joint_radius_m)?;
+        positive("friction.motor_v_s_rad_s", &self.friction.motor_v_s_rad_s)?;
+        positive("friction.joint_v_s", &self.friction.joint_v_s)?;
+        positive("integrator.substep_s", &[self.integrator.substep_s])?;
+        for (key, values) in [
+            ("cable.be_ns_m", &self.cable.be_ns_m),
+            ("cable.ke_n", &self.cable.ke_n),
+            ("friction.motor_coulomb_nm", &self.friction.motor_coulomb_nm),
+            ("friction.motor_viscous_nm_s", &self.friction.motor_viscous_nm_s),
+            ("friction.joint_coulomb", &self.friction.joint_coulomb),
+            ("friction.joint_viscous", &self.friction.joint_viscous),
+        ] {
+            not_negative(key, values)?;
+        }
+        not_negative("tool_axes.motor_coulomb_nm", &self.tool_axes.motor_coulomb_nm)?;
+        not_negative("tool_axes.motor_viscous_nm_s", &self.tool_axes.motor_viscous_nm_s)?;
         for (key, signs) in [
             ("transmission.encoder_sign_gold", &self.transmission.encoder_sign_gold),
             ("transmission.encoder_sign_green", &self.transmission.encoder_sign_green),
@@ -138,6 +156,11 @@ impl Plant {
 fn positive(key: &str, values: &[f64]) -> Result<(), PlantError> {
     let good = values.iter().all(|value| value.is_finite() && *value > 0.0);
     check(good, key, "must be positive")
+}
+
+fn not_negative(key: &str, values: &[f64]) -> Result<(), PlantError> {
+    let good = values.iter().all(|value| value.is_finite() && *value >= 0.0);
+    check(good, key, "must be 0 or more")
 }
 
 fn finite<'a>(key: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), PlantError> {

@@ -120,8 +120,11 @@ fn joint(element: &Element, name: String) -> Result<Joint, UrdfError> {
     };
     let dynamics = element.child("dynamics")?;
     let dynamic = |attribute: &str| -> Result<f64, UrdfError> {
-        let value = dynamics.as_ref().map(|dynamics| dynamics.number(attribute)).transpose()?;
-        Ok(value.flatten().unwrap_or(0.0))
+        let Some(of) = &dynamics else { return Ok(0.0) };
+        match of.number(attribute)? {
+            Some(value) if value < 0.0 => Err(of.contradiction(format!("{attribute} is negative; correct it"))),
+            value => Ok(value.unwrap_or(0.0)),
+        }
     };
     Ok(Joint {
         line: element.line(),

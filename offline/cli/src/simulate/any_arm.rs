@@ -1,7 +1,7 @@
 //! Runs of an arm from a URDF: tidy tables.
 
 use super::workers::Watch;
-use super::{Wish, commands, files, finish, name, workers};
+use super::{Wish, commands, files, finish, name, runs_away, workers};
 use recordings::save::{self, TableFormat};
 use recordings::table::{Batch, ColumnCells, TableColumn, TableSink, rows_of_batch};
 use simulator::any_arm::{ArmCycle, ArmSimulation, trajectory};
@@ -88,6 +88,9 @@ fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) 
         let time_s = (cycle as f64 * period_s * 1e9).round() / 1e9;
         table.row(time_s, &simulation.tick(&motion.at(time_s)))?;
     }
+    if !simulation.state().is_finite() {
+        return Err(runs_away(model.name()));
+    }
     table.finish()?;
     Ok(*simulation.homing_offset())
 }
@@ -96,9 +99,12 @@ fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) 
 fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, String> {
     let runs = commands::all(wish.commands, model, wish.arm)?;
     let (files, summary) = files(wish, runs.len(), format)?;
-    let seed = wish.homing_seed.or(wish.seed).unwrap_or_default();
+    // Each recording homes the robot anew.
+    let seed = |index: usize| wish.homing_seed.unwrap_or(wish.seed.unwrap_or_default().wrapping_add(index as u64));
     let total = runs.iter().map(|run| run.len() as u64).sum();
-    workers::all(&files, files.len(), total, wish.threads, |index, watch| follow(model, &runs[index], &files[index], seed, watch))?;
+    workers::all(&files, files.len(), total, wish.threads, |index, watch| {
+        follow(model, &runs[index], &files[index], seed(index), watch)
+    })?;
     let mut text = format!("robot = {}\nruns = {}\n", model.name(), runs.len());
     for (run, file) in runs.iter().zip(&files) {
         let _ = writeln!(text, "{}: commands of {}", name(file), run.name);
@@ -114,6 +120,9 @@ fn follow(model: &RobotModel, run: &resimulate::Run, file: &Path, seed: u64, wat
     for row in 0..found.len() {
         watch.cycle()?;
         table.row(found.time_s[row], &found.row(row))?;
+    }
+    if found.joints.last().is_some_and(|joints| joints.iter().any(|x| !x.is_finite())) {
+        return Err(runs_away(model.name()));
     }
     table.finish()
 }

@@ -60,6 +60,13 @@ fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, Pa
 }
 
 /// Writes the summary and says in one line what was made.
+/// What is wrong with a run whose numbers grew without bound.
+fn runs_away(robot: &str) -> String {
+    format!(
+        "{robot}: the simulation runs away: its steps cannot follow what pulls at a joint; give less stiffness or damping, or shorter steps"
+    )
+}
+
 fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<ExitCode, String> {
     crate::output::whole(summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
     let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));

@@ -1,7 +1,7 @@
 //! Runs of a RAVEN-II: full states with their truth.
 
 use super::workers::Watch;
-use super::{Wish, commands, files, finish, name, workers};
+use super::{Wish, commands, files, finish, name, runs_away, workers};
 use arm::{JOINTS, Side};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::stream::Record;
@@ -95,7 +95,15 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
         .map(|(index, run)| {
             let duration_s = run.time_s[run.len() - 1] - run.time_s[0] + 1e-3;
             let seed = wish.seed.unwrap_or_default();
-            Run { index, seed, homing_seed: wish.homing_seed.unwrap_or(seed), duration_s, zigzag: false, in_session: 0 }
+            // Each recording homes the robot anew.
+            Run {
+                index,
+                seed,
+                homing_seed: wish.homing_seed.unwrap_or(seed.wrapping_add(index as u64)),
+                duration_s,
+                zigzag: false,
+                in_session: 0,
+            }
         })
         .collect();
     let total = runs.iter().map(Run::cycles).sum();
@@ -130,6 +138,9 @@ fn write(player: &mut Player, robot: &str, more: &[(&str, &str)], file: &Path, w
         }
         sink.write(record).map_err(|error| error.to_string())
     })?;
+    if !player.is_somewhere() {
+        return Err(runs_away(robot));
+    }
     sink.finish().map_err(|error| error.to_string())?;
     if let Some(format) = table {
         let made = tidy_table(&states_file, file, format);

@@ -6,7 +6,7 @@ use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 use crate::model::{Bound, Connection, DriveModel, Effect, UrdfRobot};
 use crate::physics::{JointOffset, LinkGeometry, Physics};
 use crate::plant::{JOINTS_MAX, Method, Plant, PlantError, Stiction, Timed, Vector};
-use crate::robot_plant::{EXPLICIT_MAX, on_joint};
+use crate::robot_plant::{is_explicit, on_joint};
 
 /// Frequency of a joint's link on a cable that is only there for an effect to act on, Hz: several times that of real cables
 /// (RAVEN-II's first joint: about 25 Hz), so that what is seen is the effect.
@@ -15,8 +15,6 @@ const STIFF_HZ: f64 = 100.0;
 const STIFF_DAMPING: f64 = 0.3;
 /// Rotor inertia, at the joint, of a motor of which nothing is known, as a share of what it moves **(assumed)**.
 const ROTOR_SHARE: f64 = 0.1;
-/// Frequency times step up to which the explicit method follows a cable's vibration well.
-const EXPLICIT_PHASE_MAX: f64 = 1.0;
 
 /// The middle of the joints' ranges; 0 where a range is unknown.
 pub(crate) fn middle(arm: &SerialArm) -> Vector {
@@ -61,8 +59,7 @@ pub(crate) fn build(robot: &UrdfRobot, homing_offset: &Vector) -> Result<Plant, 
     if let Some(joint) = plant.massless(&middle) {
         return Err(PlantError::Massless { joint: joint + 1 });
     }
-    let (rate, frequency) = (plant.fastest_rate(&middle), plant.fastest_frequency(&middle));
-    let explicit = rate * robot.step_s < EXPLICIT_MAX && frequency * robot.step_s < EXPLICIT_PHASE_MAX;
+    let explicit = is_explicit(&mut plant, &middle, robot.step_s);
     plant.set_step(if explicit { Method::Rk4 } else { Method::Rosenbrock }, robot.step_s);
     Ok(plant)
 }

@@ -1,5 +1,6 @@
 //! Robot files of a RAVEN-II, read strictly.
 
+use arm::plant::PlantError;
 use arm::{JOINTS, Raven2};
 use serde::Deserialize;
 use toml::Spanned;
@@ -9,6 +10,9 @@ use super::error::{line_of, syntax};
 use super::tables::{EffectTable, SiteTable, effects, not_negative, positive, sites, value};
 use super::{PayloadSite, Pretension, Robot, RobotError, raven};
 use crate::plant::Dragged;
+
+/// Shortest memory that steps of a fraction of a millisecond can follow, s.
+const MEMORY_LEAST_S: f64 = 1e-3;
 
 const NOMINAL: &str = include_str!("../../../../models/raven2-plant.toml");
 
@@ -104,6 +108,13 @@ pub(super) fn robot(text: &str) -> Result<(Robot, Vec<PayloadSite>), RobotError>
             "tool_cables",
             "must hold numbers above 0, N m/rad, N m, rad/s and s at motor 3",
         )?;
+        require(
+            memory_s >= MEMORY_LEAST_S,
+            &table,
+            text,
+            "tool_cables.memory_s",
+            "must be 0.001 or more, s: steps are no shorter",
+        )?;
         robot.tool_cables = Some(Dragged { stiffness_nm_rad, level_nm, v_s_rad_s, memory_s });
     }
     let names = raven::names();
@@ -115,7 +126,34 @@ pub(super) fn robot(text: &str) -> Result<(Robot, Vec<PayloadSite>), RobotError>
 pub(super) fn changed(changes: toml::Table) -> Result<Robot, RobotError> {
     let mut plant = nominal_table()?;
     merge(&mut plant, changes.clone());
-    Ok(Robot { changes, ..Robot::of(Raven2::from_toml(&plant.to_string())?) })
+    let raven = Raven2::from_toml(&plant.to_string())?;
+    is_simulated(raven.plant())?;
+    Ok(Robot { changes, ..Robot::of(raven) })
+}
+
+/// Refuses what the simulator would quietly take for something else.
+fn is_simulated(plant: &arm::plant::Plant) -> Result<(), PlantError> {
+    let (sampling, method) = (&plant.sampling, plant.integrator.method.as_str());
+    let filters = ["none", sampling.alternative_filter.kind.as_str()];
+    for (good, key, what) in [
+        (sampling.period_s == 1e-3, "sampling.period_s", "must be 0.001: the simulated controller has no other"),
+        (
+            sampling.measurement_delay_cycles == 1,
+            "sampling.measurement_delay_cycles",
+            "must be 1: the simulated controller has no other",
+        ),
+        (
+            filters.contains(&sampling.velocity_filter.as_str()),
+            "sampling.velocity_filter",
+            "must be \"none\" or alternative_filter.kind",
+        ),
+        (["rk4", "ros2"].contains(&method), "integrator.method", "must be \"rk4\" or \"ros2\""),
+    ] {
+        if !good {
+            return Err(PlantError::Value { key: key.to_owned(), what });
+        }
+    }
+    Ok(())
 }
 
 /// Refuses keys of `[plant]` that the plant file does not have, in the line in which they stand.
@@ -255,5 +293,32 @@ mod tests {
         assert!(effect("physics = \"payload\"\nfrom_s = 2.0\nto_s = 1.0\nparameters = { m_p = 0.1 }").contains("before to_s"));
         assert!(refused("[homing]\noffset_sd = [0, 0, -1, 0, 0, 0, 0]\n").contains("homing.offset_sd"));
         assert!(refused("colour = 1\n").contains("line 4: unknown field `colour`"));
+        let twice = |effect: &str| refused(&format!("[[effect]]\n{effect}\n[[effect]]\n{effect}\n"));
+        for effect in [
+            "physics = \"cable_hysteresis\"\njoint = 2\nparameters = { a = 0.5, k = 1000.0, z_m = 0.001 }",
+            "physics = \"measurement_delay\"\nchannel = \"motor\"\nparameters = { d = 0.002 }",
+        ] {
+            assert!(twice(effect).contains("effect 2") && twice(effect).contains("stands there already"), "{}", twice(effect));
+        }
+    }
+
+    #[test]
+    fn what_the_simulator_would_divide_by_or_does_not_have_is_refused() {
+        for (table, key, what) in [
+            ("integrator]\nsubstep_s = 0.0", "integrator.substep_s", "must be positive"),
+            ("integrator]\nmethod = \"euler\"", "integrator.method", "must be \"rk4\" or \"ros2\""),
+            ("friction]\njoint_v_s = [0.01, 0.0, 0.002]", "friction.joint_v_s", "must be positive"),
+            ("friction]\njoint_viscous = [0.005, -0.002, 0.005]", "friction.joint_viscous", "must be 0 or more"),
+            ("cable]\njoint_radius_m = [0.0, 0.1, 1.0]", "cable.joint_radius_m", "must be positive"),
+            ("motor]\ninertia_capstan = [0.0, 1e-4, 1e-4]", "motor.inertia_capstan", "must be positive"),
+            ("sampling]\nperiod_s = 0.002", "sampling.period_s", "must be 0.001"),
+            ("sampling]\nmeasurement_delay_cycles = 2", "sampling.measurement_delay_cycles", "must be 1"),
+            ("sampling]\nvelocity_filter = \"kalman\"", "sampling.velocity_filter", "must be \"none\" or"),
+        ] {
+            let said = refused(&format!("[plant.{table}\n"));
+            assert!(said.contains(key) && said.contains(what), "{table}: {said}");
+        }
+        let memory = "[tool_cables]\nstiffness_nm_rad = 0.02\nlevel_nm = 0.06\nv_s_rad_s = 4.0\nmemory_s = 0.0001\n";
+        assert!(refused(memory).contains("tool_cables.memory_s"), "{}", refused(memory));
     }
 }

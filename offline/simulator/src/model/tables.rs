@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::effect::{Given, Names, Which, index};
 use super::error::line_of;
 use super::{Effect, PayloadSite, RobotError};
-use crate::physics::{Parameters, Value};
+use crate::physics::{Parameters, Physics, Value};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,7 +51,29 @@ pub(super) fn effects(tables: &[Spanned<EffectTable>], names: &Names, text: &str
             what,
         })
     };
-    tables.iter().enumerate().map(one).collect()
+    let all: Vec<Effect> = tables.iter().enumerate().map(one).collect::<Result<_, _>>()?;
+    for (at, effect) in all.iter().enumerate() {
+        if all[..at].iter().any(|other| exclude_each_other(other, effect)) {
+            return Err(RobotError::Effect {
+                line: line_of(text, tables[at].span().start),
+                number: at + 1,
+                physics: effect.physics.name().to_owned(),
+                what: "stands there already; a joint has one hysteresis at a time and a channel one delay: make one of them"
+                    .to_owned(),
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Of these the plant has room for one in a place.
+fn exclude_each_other(a: &Effect, b: &Effect) -> bool {
+    a.bound == b.bound
+        && match (a.physics, b.physics) {
+            (Physics::CableHysteresis(_), Physics::CableHysteresis(_)) => a.from_s < b.to_s && b.from_s < a.to_s,
+            (Physics::MeasurementDelay(_), Physics::MeasurementDelay(_)) => true,
+            _ => false,
+        }
 }
 
 fn effect(table: &EffectTable, names: &Names) -> Result<Effect, String> {

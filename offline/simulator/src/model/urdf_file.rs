@@ -198,6 +198,7 @@ impl Reader<'_> {
         entries: &BTreeMap<Spanned<String>, Entry>,
     ) -> Result<(), RobotError> {
         let drive = &mut robot.drives[joint];
+        let (reduction, mut referenced) = (drive.reduction.abs(), false);
         let mut connection = None;
         for (key, entry) in entries {
             let name = key.get_ref().as_str();
@@ -211,6 +212,7 @@ impl Reader<'_> {
                 connection = Some(found.ok_or_else(|| refuse(format!("must be one of the words {words}")))?.1);
                 continue;
             }
+            referenced |= name == "torque_ref_nm";
             let Some(field) = FIELDS.iter().find(|field| field.name == name) else {
                 let known: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
                 return Err(refuse(format!("is not known; a drive has connection, {}", known.join(", "))));
@@ -224,6 +226,10 @@ impl Reader<'_> {
         drive.connection = connection.unwrap_or(elastic);
         if drive.connection == Connection::Force {
             drive.reduction = 1.0;
+        }
+        if !referenced {
+            // At the shaft; what is known of it is at the joint.
+            drive.torque_ref_nm *= reduction / drive.reduction.abs();
         }
         let refuse = |what: &str| Err(self.refuse(table.span().start, format!("drive.{}", table.get_ref()), what));
         if drive.connection == Connection::Cable && !(drive.stiffness > 0.0 && drive.rotor_inertia_kg_m2 > 0.0) {

@@ -1,6 +1,6 @@
 //! `cable_creep`: a cable under load grows longer with time, and recovers when the load goes.
 
-use super::parameters::{NOT_NEGATIVE, POSITIVE, Parameter, ParameterError, Parameters};
+use super::parameters::{LASTING_S, NOT_NEGATIVE, Parameter, ParameterError, Parameters};
 
 /// `Dd_k = (J_k tau_load - D_k) / T_k`: one Kelvin-Voigt element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +14,7 @@ pub struct CableCreep {
 impl CableCreep {
     /// Names and units.
     pub const PARAMETERS: [Parameter; 2] =
-        [Parameter::needed("J_k", "rad/(N.m)|m/N", NOT_NEGATIVE), Parameter::needed("T_k", "s", POSITIVE)];
+        [Parameter::needed("J_k", "rad/(N.m)|m/N", NOT_NEGATIVE), Parameter::needed("T_k", "s", LASTING_S)];
 
     /// From parameters by name.
     ///

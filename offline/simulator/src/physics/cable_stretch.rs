@@ -36,12 +36,6 @@ impl CableStretch {
         let k = if self.stiffening == 0.0 { self.k } else { self.k * (self.stiffening * stretch_m).cosh() };
         k / (known + k)
     }
-
-    /// Damping of the two in series at low frequency, from the damping of the known cable and its share.
-    #[inline]
-    pub fn damping(&self, known: f64, share: f64) -> f64 {
-        share * share * known + (1.0 - share) * (1.0 - share) * self.d
-    }
 }
 
 #[cfg(test)]

@@ -42,6 +42,8 @@ pub(crate) const ANY: (f64, f64) = (f64::MIN, f64::MAX);
 pub(crate) const NOT_NEGATIVE: (f64, f64) = (0.0, f64::MAX);
 /// Any number above 0.
 pub(crate) const POSITIVE: (f64, f64) = (f64::MIN_POSITIVE, f64::MAX);
+/// A time that steps of a fraction of a millisecond can follow.
+pub(crate) const LASTING_S: (f64, f64) = (1e-3, f64::MAX);
 
 /// Why parameters were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -144,6 +146,7 @@ fn out_of_range(parameter: &'static Parameter, value: &Value) -> ParameterError 
         ANY => "one finite number".to_owned(),
         NOT_NEGATIVE => "one number of 0 or more".to_owned(),
         POSITIVE => "one number above 0".to_owned(),
+        LASTING_S => "one number of 0.001 or more".to_owned(),
         (low, high) => format!("one number from {low} to {high}"),
     };
     ParameterError::Range { name: parameter.name, found: shown(value), expected, unit: parameter.unit }

@@ -1,6 +1,6 @@
 //! `thermal_drift`: friction fades (or grows) as motor, grease and cable warm up, and returns at rest.
 
-use super::parameters::{POSITIVE, Parameter, ParameterError, Parameters};
+use super::parameters::{LASTING_S, Parameter, ParameterError, Parameters};
 
 /// `f_c(t) = f_c0 (1 - kappa_T h)`; the warmth `h` follows `hd = (u - h) / T`, `u` the square of the torque over its reference.
 /// Under the reference torque `h = 1 - exp(-t / T)`.
@@ -14,7 +14,7 @@ pub struct ThermalDrift {
 
 impl ThermalDrift {
     /// Names and units.
-    pub const PARAMETERS: [Parameter; 2] = [Parameter::needed("kappa_T", "1", (-5.0, 1.0)), Parameter::needed("T", "s", POSITIVE)];
+    pub const PARAMETERS: [Parameter; 2] = [Parameter::needed("kappa_T", "1", (-5.0, 1.0)), Parameter::needed("T", "s", LASTING_S)];
 
     /// No motor gets warmer than under twice its reference torque.
     const HEATING_MAX: f64 = 4.0;

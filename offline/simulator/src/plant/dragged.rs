@@ -31,7 +31,8 @@ impl Dragged {
 
     /// Torque that holds the motor back, N·m at the capstan.
     pub fn torque(&self, strain: f64, faded: f64) -> f64 {
-        let level = self.level(faded);
+        // More than all of it may seem to have faded within a step.
+        let level = self.level(faded).max(0.0);
         (self.stiffness_nm_rad * strain).clamp(-level, level)
     }
 }

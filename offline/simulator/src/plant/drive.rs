@@ -189,16 +189,13 @@ impl Drive {
             contact = f64::min(contact, backlash.contact(taken));
         }
         let radius = self.nominal.radius_m;
-        let share = |known: f64| on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, radius * taken));
+        let share = |known: f64| in_series(on(&self.stretch).map(|stretch| stretch.share(known, radius * taken)));
         let mut found = match self.hysteresis.iter().find(|(cable, _)| cable.on) {
             None => {
                 let known = radius * radius * self.nominal.cable.at(0.0).stiffness_n_m;
                 let share = if self.stretch.is_empty() { 1.0 } else { share(known) };
                 let cable = self.nominal.cable.at(radius * share * taken);
-                let mut damping = radius * radius * cable.damping_ns_m;
-                for stretch in on(&self.stretch) {
-                    damping = stretch.damping(damping, share);
-                }
+                let damping = self.damping(radius * radius * cable.damping_ns_m, known, share, radius * taken);
                 Elastic { torque: radius * cable.force_n, stiffness: share * radius * radius * cable.stiffness_n_m, damping }
             }
             Some((cable, slot)) => {
@@ -207,7 +204,7 @@ impl Drive {
                 Elastic {
                     torque: cable.effect.force(share * taken, aux[*slot]),
                     stiffness: share * cable.effect.slope(rate, aux[*slot]),
-                    damping: share * share * nominal,
+                    damping: self.damping(nominal, cable.effect.k, share, radius * taken),
                 }
             }
         };
@@ -216,6 +213,16 @@ impl Drive {
         // A flank pushes, it never pulls.
         found.torque = if !loose || damped * taken > 0.0 { damped } else { 0.0 };
         found
+    }
+
+    /// Damping of the known cable and the springs in series with it at low frequency: each by the square of its share of the deflection.
+    fn damping(&self, own: f64, known: f64, share: f64, stretch_m: f64) -> f64 {
+        let mut damping = share * share * own;
+        for stretch in on(&self.stretch) {
+            let part = share * (1.0 / stretch.share(known, stretch_m) - 1.0);
+            damping += part * part * stretch.d;
+        }
+        damping
     }
 
     /// Friction of motor and gearbox at a motor speed: N·m at the capstan, and the chord.
@@ -261,7 +268,7 @@ impl Drive {
         }
         Friction {
             torque: warm * (level * sign + one_sided) + viscous * speed,
-            per_load: warm * per_load,
+            per_load: (warm * per_load).min(PER_LOAD_MAX),
             sign,
             slope: warm * level * chord + viscous,
             sign_slope: chord,
@@ -276,6 +283,16 @@ impl Drive {
             gear / ratio.abs() * level / motor.width + gear / (ratio * ratio) * viscous
         };
         motor.coulomb / motor.width + motor.viscous + self.on_motor.iter().map(slope).sum::<f64>()
+    }
+
+    /// Damping of the cable with every effect acting, or with none, whichever is more.
+    pub(crate) fn steepest_damping(&self) -> f64 {
+        let area = self.nominal.radius_m * self.nominal.radius_m;
+        let cable = self.nominal.cable.at(0.0);
+        let (known, nominal) = (area * cable.stiffness_n_m, area * cable.damping_ns_m);
+        let stiffest = self.hysteresis.iter().map(|(hysteresis, _)| hysteresis.effect.k).fold(known, f64::max);
+        let added = |stretch: &Timed<CableStretch>| (1.0 - stretch.effect.share(stiffest, 0.0)).powi(2) * stretch.effect.d;
+        nominal + self.stretch.iter().map(added).sum::<f64>()
     }
 
     /// Slope of the joint's friction at standstill with every effect acting.
@@ -303,10 +320,39 @@ impl Drive {
     }
 }
 
+/// Friction per load of all effects together, warm or not: from 1 on a load would not move by whatever pulls at it.
+const PER_LOAD_MAX: f64 = 0.95;
+
+/// Share of the deflection that falls on the known cable, of springs in series with it, each of which alone leaves it so much.
+pub(crate) fn in_series(shares: impl Iterator<Item = f64>) -> f64 {
+    // Compliances over the known one's add up.
+    let added: Option<(usize, f64, f64)> =
+        shares.map(|share| (1, share, 1.0 / share - 1.0)).reduce(|all, one| (all.0 + 1, one.1, all.2 + one.2));
+    match added {
+        None => 1.0,
+        Some((1, share, _)) => share,
+        Some((_, _, compliance)) => 1.0 / (1.0 + compliance),
+    }
+}
+
 /// Smoothed sign and its chord, sign over speed.
 #[inline]
 fn sign_and_chord(speed: f64, width: f64) -> (f64, f64) {
     let sign = smooth_sign(speed, width);
     let chord = if speed.abs() < 1e-9 * width { 1.0 / width } else { sign / speed };
     (sign, chord)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_series;
+
+    #[test]
+    fn compliances_of_springs_in_series_add_up() {
+        assert_eq!(in_series(std::iter::empty()), 1.0);
+        assert_eq!(in_series([0.3].into_iter()), 0.3);
+        // Known spring and two more of its stiffness: a third of the way each.
+        assert!((in_series([0.5, 0.5].into_iter()) - 1.0 / 3.0).abs() < 1e-15);
+        assert!((in_series([0.5, 0.25, 0.5].into_iter()) - 1.0 / 6.0).abs() < 1e-15);
+    }
 }

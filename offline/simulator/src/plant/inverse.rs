@@ -124,7 +124,7 @@ impl Plant {
         };
         let mut ends = motion.map(by);
         (0..n).filter(|i| self.drives[*i].nominal.between == Between::Cable).for_each(|i| ends[0][i] += deflection[i]);
-        let (seen, slope) = self.unshifted(&ends[0]);
+        let (seen, _, slope) = self.unshifted(&ends[0], &[0.0; JOINTS_MAX]);
         ends[0] = seen;
         let motors = ends.map(|part| std::array::from_fn(|i| if i < n { part[i] * self.drives[i].nominal.ratio } else { 0.0 }));
         (motors, slope)

@@ -1,6 +1,6 @@
 //! What a drive remembers: hysteresis, creep, warmth.
 
-use super::drive::{Drive, on};
+use super::drive::{Drive, in_series, on};
 
 impl Drive {
     /// Rates of the memories of this drive, given the torque that the cable transmits.
@@ -9,7 +9,7 @@ impl Drive {
             // Without contact the cable is not strained, and its memory stands.
             let strained = if self.backlash.is_empty() || torque != 0.0 { deflection_rate } else { 0.0 };
             let known = cable.effect.k;
-            let share = on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, 0.0));
+            let share = in_series(on(&self.stretch).map(|stretch| stretch.share(known, 0.0)));
             rates[*slot] = if cable.on { cable.effect.memory_rate(share * strained, aux[*slot]) } else { 0.0 };
         }
         for (creep, slot) in &self.creep {
@@ -25,7 +25,7 @@ impl Drive {
     pub(crate) fn strain(&self, change: f64, aux: &mut [f64]) {
         for (cable, slot) in self.hysteresis.iter().filter(|(cable, _)| cable.on) {
             let known = cable.effect.k;
-            let share = on(&self.stretch).fold(1.0, |share, stretch| share * stretch.share(known, 0.0));
+            let share = in_series(on(&self.stretch).map(|stretch| stretch.share(known, 0.0)));
             aux[*slot] += cable.effect.memory_rate(share * change, aux[*slot]);
         }
     }

@@ -65,6 +65,11 @@ impl State {
         speeds: [0.0; JOINTS_MAX],
         memories: [0.0; MEMORIES_MAX],
     };
+
+    /// Is every joint and motor somewhere?
+    pub fn is_finite(&self) -> bool {
+        [&self.joints, &self.rates, &self.motors, &self.speeds].iter().all(|vector| vector.iter().all(|x| x.is_finite()))
+    }
 }
 
 /// Why a plant cannot be built.

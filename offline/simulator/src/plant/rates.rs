@@ -13,7 +13,7 @@ impl Plant {
         for i in 0..n {
             let drive = &self.drives[i];
             let nominal = &drive.nominal;
-            let damping = nominal.radius_m * nominal.radius_m * nominal.cable.at(0.0).damping_ns_m;
+            let damping = drive.steepest_damping();
             let motor = drive.steepest_motor_friction();
             let link = drive.steepest_friction() + damping + nominal.passive.damping;
             if nominal.between == Between::Rigid {

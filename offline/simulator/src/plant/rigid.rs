@@ -90,28 +90,29 @@ impl Plant {
         let mut wanted: Vector = std::array::from_fn(|i| state.motors[i] / self.drive_ratio(i));
         let mut rates: Vector = std::array::from_fn(|i| state.speeds[i] / self.drive_ratio(i));
         if self.shifted {
-            self.shift(&mut wanted, &mut [0.0; JOINTS_MAX]);
+            self.shift(&mut wanted, &mut rates);
         }
         self.see_rigid(state, &mut wanted, &mut rates);
-        let (seen, _) = self.unshifted(&wanted);
+        let (seen, turning, _) = self.unshifted(&wanted, &rates);
         for i in (0..n).filter(|i| self.is_rigid(*i)) {
-            (state.motors[i], state.speeds[i]) = (seen[i] * self.drive_ratio(i), rates[i] * self.drive_ratio(i));
+            (state.motors[i], state.speeds[i]) = (seen[i] * self.drive_ratio(i), turning[i] * self.drive_ratio(i));
         }
     }
 
-    /// Motor-side positions that a shift turns into the given ones, and the slope of the shift there.
-    pub(super) fn unshifted(&self, shifted: &Vector) -> (Vector, Vector) {
-        let (mut seen, mut slope) = (*shifted, [0.0; JOINTS_MAX]);
+    /// Motor-side positions and rates that a shift turns into the given ones, and the slope of the shift there.
+    pub(super) fn unshifted(&self, shifted: &Vector, rates: &Vector) -> (Vector, Vector, Vector) {
+        let (mut seen, mut turning, mut slope) = (*shifted, *rates, [0.0; JOINTS_MAX]);
         if self.shifted {
             for _ in 0..ROUNDS {
-                let mut found = seen;
-                slope = self.shift(&mut found, &mut [0.0; JOINTS_MAX]);
+                let (mut found, mut found_rates) = (seen, turning);
+                slope = self.shift(&mut found, &mut found_rates);
                 for i in 0..self.joints {
                     seen[i] += shifted[i] - found[i];
+                    turning[i] += rates[i] - found_rates[i];
                 }
             }
         }
-        (seen, slope)
+        (seen, turning, slope)
     }
 
     fn drive_ratio(&self, joint: usize) -> f64 {
