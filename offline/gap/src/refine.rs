@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::hypothesis::{BEFORE, Candidate, Dictionary, Family, GROUND};
+use crate::hypothesis::{Candidate, Dictionary, Family, Valley};
 use crate::parallel;
 
-/// Halvings of a step before a number is settled.
+/// Halvings of a step before a number is settled, and of those that are known sharply.
 const HALVINGS: usize = 7;
+const SHARP_HALVINGS: usize = 12;
 /// Times that secants are drawn to the last coefficients.
 const SECANTS: usize = 4;
 /// First step of an edge, of its time.
 const EDGE_S: f64 = 0.1;
-/// Rounds over all numbers of a shape, at most; over those of a memory of the whole motion; and over those of which one makes up for another:
-/// how slow, and since when.
+/// Rounds over all numbers of a shape, at most, and over those of which one makes up for another.
 const ROUNDS: usize = 6;
 const SHARP_ROUNDS: usize = 10;
-const ROUNDS_IN_VALLEYS: usize = 12;
+const LONG_ROUNDS: usize = 12;
 /// How often choices are made anew.
 const CHOICES: usize = 4;
 
@@ -77,24 +77,19 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
         least = misfit(&best);
     }
     let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
-    let in_a_valley = family.shape.contains(&BEFORE);
-    // Sharp and long valleys: memories that the motion shows in every sample.
-    let rounds = if family.form == GROUND {
-        SHARP_ROUNDS
-    } else if in_a_valley {
-        ROUNDS_IN_VALLEYS
-    } else if free.len() + best.edges() > 1 {
-        ROUNDS
-    } else {
-        1
+    let (rounds, halvings) = match family.valley {
+        Valley::Sharp => (SHARP_ROUNDS, SHARP_HALVINGS),
+        Valley::Long => (LONG_ROUNDS, HALVINGS),
+        Valley::Plain if free.len() + best.edges() > 1 => (ROUNDS, HALVINGS),
+        Valley::Plain => (1, HALVINGS),
     };
     for _ in 0..rounds {
         let before = least;
         for &k in &free {
-            // In a valley each round begins with the steps of the first: from where a number came to rest, the grid may be next to nothing away.
-            let from = if in_a_valley { start.shape[k] } else { best.shape[k] };
+            // In a long valley each round begins with the steps of the first: from where a number came to rest, the grid may be next to nothing away.
+            let from = if family.valley == Valley::Long { start.shape[k] } else { best.shape[k] };
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, from));
-            for _ in 0..HALVINGS + if rounds == SHARP_ROUNDS { 5 } else { 0 } {
+            for _ in 0..halvings {
                 let here = best.shape[k];
                 for there in [here - step, here + step] {
                     // A positive number of a grid stays one.

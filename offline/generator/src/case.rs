@@ -44,8 +44,11 @@ impl Order {
     ///
     /// # Errors
     ///
-    /// For physics or joints that do not exist.
+    /// For physics or joints that do not exist, and for no run at all.
     pub fn make(&self) -> Result<Case, String> {
+        if self.runs == 0 {
+            return Err("runs must be 1 or more".into());
+        }
         let pair = self.pair();
         let noise = Noise::scaled(self.noise);
         let trajectories: Vec<Trajectory> = (0..self.runs)

@@ -205,8 +205,9 @@ fn bodies_and_motors() {
     let slow = |&k: &usize| (0..3).all(|j| (bench.without.motor_speed[k][j] - bench.without.motor_speed[k - 150][j]).abs() < 8.0);
     let with = bench.with("payload", None, &[("m_p", 0.2), ("c_x", at.x), ("c_y", at.y), ("c_z", at.z)]);
     let turned = bench.with("gravity_direction", None, &[("a", 0.1), ("b", -0.15)]);
-    let gravity = generator::arm::rotation(bench.arm.mount).transpose()
-        * (Rotation3::new(Vector3::new(0.1, -0.15, 0.0)) * generator::arm::GRAVITY);
+    // About the axes of frame 0, the link `base`.
+    let gravity = Rotation3::new(Vector3::new(0.1, -0.15, 0.0))
+        * (generator::arm::rotation(bench.arm.mount).transpose() * generator::arm::GRAVITY);
     for (signals, change) in [
         (&with, &(|chain: &mut Chain<3>| chain.set_load(0.2, at)) as &dyn Fn(&mut Chain<3>)),
         (&turned, &|chain: &mut Chain<3>| chain.set_gravity(gravity)),

@@ -1,6 +1,6 @@
 //! What a group of cases says.
 
-use crate::judge::Judged;
+use crate::judge::{Judged, NO_REPORT};
 use crate::statistics::{Quantile, Rate, bootstrap};
 use serde::Serialize;
 
@@ -115,7 +115,7 @@ impl Outside {
         Self {
             physics: physics.to_owned(),
             refused: rate(&|case| ["unmodelled", "partly_explained"].contains(&case.status.as_str())),
-            wrong_name: rate(&|case| case.status == "explained" && case.set_size == 1),
+            wrong_name: rate(&|case| case.status == NO_REPORT || (case.status == "explained" && case.set_size == 1)),
             wrong_set: rate(&|case| case.status == "explained" && case.set_size > 1),
             missed: rate(&|case| !["unmodelled", "partly_explained", "explained"].contains(&case.status.as_str())),
         }

@@ -76,15 +76,20 @@ pub struct Judged {
     pub seconds: Option<f64>,
 }
 
-/// Judges a case; no report counts as the answer `no report`.
+/// Answer and status of a case without a report.
+pub const NO_REPORT: &str = "no report";
+
+/// Judges a case; no report counts as the answer [`NO_REPORT`].
 pub fn judge(truth: &Truth, report: Option<&Report>) -> Judged {
     let silent = Report::default();
     let answered = report.unwrap_or(&silent);
     let primaries = answered.primaries();
     let first = primaries.first().copied();
     let answer = match (report, first) {
-        (None, _) => "no report",
+        (None, _) => NO_REPORT,
         (_, Some(verdict)) => verdict.physics.as_str(),
+        // That there are too few data is not that there is nothing.
+        (Some(report), None) if report.status == "insufficient_data" => "insufficient_data",
         (_, None) => "none",
     };
     let named: Vec<&Verdict> =
@@ -110,7 +115,7 @@ pub fn judge(truth: &Truth, report: Option<&Report>) -> Judged {
             truth.effects.iter().map(|effect| effect.physics.clone()).collect()
         },
         answer: answer.to_owned(),
-        status: if report.is_some() { answered.status.clone() } else { "no report".into() },
+        status: if report.is_some() { answered.status.clone() } else { NO_REPORT.into() },
         detected: answered.mismatch.detected,
         top,
         alone: top && named.len() <= truth.effects.len(),

@@ -70,7 +70,7 @@ pub fn tables(score: &Score) -> Vec<Table> {
             [low, high] => format!("{} to {} %", percent(low), percent(high)),
         };
         let level = if t.level == 0.0 { "any".into() } else { format!("{}", t.level) };
-        let reached = format!("{:.1} % ({}-{}) of {}", 100.0 * t.reached, percent(t.ci95[0]), percent(t.ci95[1]), t.of);
+        let reached = format!("{:.1} % ({:.1}-{:.1}) of {}", 100.0 * t.reached, 100.0 * t.ci95[0], 100.0 * t.ci95[1], t.of);
         vec![t.name.clone(), level, wanted, reached, if t.met { "met" } else { "missed" }.into()]
     };
     tables.push(Table {

@@ -2,7 +2,7 @@
 
 use crate::confusion::{Confusion, confusion};
 use crate::figures::{Bin, Figures, Outside, Pairs, calibration, calibration_error};
-use crate::judge::Judged;
+use crate::judge::{Judged, NO_REPORT};
 use crate::statistics::{Quantile, Rate, bootstrap, clopper_upper};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -133,7 +133,10 @@ pub fn score(judged: Vec<Judged>, [truth_manifest_sha256, report_manifest_sha256
 
     let nulls = [0.0, 1.0, 2.0, 4.0].map(|noise| {
         let alarms = Rate::of(
-            pick(&|case| case.truth == ["none"] && (noise == 0.0 || case.noise == noise)).iter().map(|case| case.detected),
+            // Who gives no report has not said that there is nothing.
+            pick(&|case| case.truth == ["none"] && (noise == 0.0 || case.noise == noise))
+                .iter()
+                .map(|case| case.detected || case.status == NO_REPORT),
         );
         Nulls { noise, alarms, upper95: clopper_upper(alarms.hits, alarms.of) }
     });

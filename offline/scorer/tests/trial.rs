@@ -165,6 +165,23 @@ fn nulls_pairs_and_outside() {
 }
 
 #[test]
+fn a_tool_that_gives_no_report_has_not_said_that_there_is_nothing() {
+    let folder = Folder::new("silent");
+    for id in ["silent", "answered"] {
+        folder.seal(id, &truth(id, "null", &json!([])));
+    }
+    folder.answer("answered", &none());
+    let drag = json!([{"physics": "outside:drag", "joint": 2, "joint_name": "elbow", "severity_wanted": 3.0, "severity": 3.0}]);
+    folder.seal("mute", &truth("mute", "outside", &drag));
+    folder.seal("few", &truth("few", "null", &json!([])));
+    folder.answer("few", &report("insufficient_data", &[]));
+    let score = folder.score();
+    assert_eq!((score.nulls[0].alarms.hits, score.nulls[0].alarms.of), (1, 3));
+    assert_eq!([score.outside[0].wrong_name.hits, score.outside[0].refused.hits, score.outside[0].missed.hits], [1, 0, 1]);
+    assert_eq!(score.confusion.counts[22][22], 1, "one said that there is nothing");
+}
+
+#[test]
 fn coupling_names_two_joints_and_geometry_either_side() {
     let folder = Folder::new("joints");
     let coupling = json!({"physics": "joint_coupling", "joint": 2, "joint_name": "elbow", "parameters": {"c_ij": -0.01}, "severity_wanted": 1.0, "severity": 1.0});

@@ -12,8 +12,11 @@ pub(super) fn free_bytes() -> Option<u64> {
 fn of_group() -> Option<u64> {
     let groups = read_to_string("/proc/self/cgroup").ok()?;
     let path = groups.lines().find_map(|line| line.strip_prefix("0::"))?;
-    let of = |file: &str| read_to_string(format!("/sys/fs/cgroup{path}/{file}")).ok()?.trim().parse::<u64>().ok();
-    Some(of("memory.max")?.saturating_sub(of("memory.current")?))
+    let text = |file: &str| read_to_string(format!("/sys/fs/cgroup{path}/{file}")).ok();
+    let of = |file: &str| text(file)?.trim().parse::<u64>().ok();
+    // Files that were read stay in memory while nobody else needs it: they count as the group's, and are free.
+    let given_back = text("memory.stat").and_then(|stat| number(&stat, "inactive_file ")).unwrap_or(0);
+    Some(of("memory.max")?.saturating_sub(of("memory.current")?.saturating_sub(given_back)))
 }
 
 /// What `ulimit -v` leaves.

@@ -49,7 +49,7 @@ fn caption(picture: &BeforeAfter) -> String {
     let band = floor.map_or_else(String::new, |floor| {
         format!(" Noise alone ({} RMS) stays between the dashed lines 95 % of the time.", with_unit(floor, &picture.error.unit))
     });
-    format!("{} was not used for fitting.{band}", picture.run)
+    format!("What is shown of {} was not used for fitting.{band}", picture.run)
 }
 
 /// Start of the stretch of a length with the most energy before the correction, by a running sum over the samples.

@@ -53,7 +53,7 @@ pub(super) fn tiles(report: &Report) -> String {
         let floor = fit.noise_floor.map_or_else(String::new, |floor| format!("noise alone {}", as_given(floor, &fit.unit)));
         tiles.push(Tile::new(&capital(&fit.quantity), change(fit), &floor));
     } else if let Some(worst) = report.mismatch.excess_rms.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
-        let name = format!("Largest error{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
+        let name = format!("Largest beyond noise{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
         let floor = format!("noise alone {}", as_given(worst.noise_floor, &worst.unit));
         tiles.push(Tile::new(&name, as_given(worst.value, &worst.unit), &floor));
     }

@@ -20,7 +20,9 @@ pub(super) fn place(report: &Report, pictures: &Pictures) -> String {
         for group in grouped(&maps) {
             out += &figure(|width| heat_maps(&group, most, width), WIDE_PX);
         }
-        let held_out: Vec<&str> = report.held_out().collect();
+        let part =
+            |run: &crate::Run| if run.role == crate::RunRole::Split { format!("the end of {}", run.id) } else { run.id.clone() };
+        let held_out: Vec<String> = report.inputs.runs.iter().filter(|run| run.is_held_out()).map(part).collect();
         if !held_out.is_empty() {
             out += &text("p", "fine", &format!("Held out, not used for fitting: {}.", held_out.join(", ")));
         }
@@ -77,5 +79,5 @@ fn sizes(report: &Report) -> String {
         ]
     };
     let rows = report.mismatch.excess_rms.iter().map(row).collect();
-    table(1, &["", "RMS error", "Noise", "Ratio"], rows)
+    table(1, &["", "RMS beyond noise", "Noise", "Ratio"], rows)
 }

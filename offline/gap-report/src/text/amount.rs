@@ -32,6 +32,11 @@ pub(super) fn amount(parameter: &Parameter) -> String {
     hedged(parameter, &Estimate::new(parameter.value, parameter.ci95, &parameter.unit))
 }
 
+/// The same, in as many decimals as its distance from what would be nothing needs.
+pub(super) fn amount_beside(parameter: &Parameter, nothing: f64) -> String {
+    hedged(parameter, &Estimate::beside(parameter.value, parameter.ci95, nothing, &parameter.unit))
+}
+
 /// The same in a given multiple.
 pub(super) fn amount_in(parameter: &Parameter, scale: &Scale) -> String {
     hedged(parameter, &Estimate::scaled(parameter.value, parameter.ci95, scale))

@@ -67,9 +67,18 @@ impl Estimate {
 
     /// In a given multiple. As many decimals as two digits of the half width need, but three significant digits at most.
     pub(crate) fn scaled(value: f64, ci95: [f64; 2], scale: &Scale) -> Self {
-        let [value, low, high] = [value, ci95[0], ci95[1]].map(|value| value * scale.per_unit);
+        Self::in_digits(value, ci95, value, scale)
+    }
+
+    /// With the digits of its distance from what would be nothing.
+    pub(crate) fn beside(value: f64, ci95: [f64; 2], nothing: f64, unit: &str) -> Self {
+        Self::in_digits(value, ci95, value - nothing, &scale(value, unit))
+    }
+
+    fn in_digits(value: f64, ci95: [f64; 2], of: f64, scale: &Scale) -> Self {
+        let [value, low, high, of] = [value, ci95[0], ci95[1], of].map(|value| value * scale.per_unit);
         let half = 0.5 * (high - low).abs();
-        let largest = value.abs().max(if value == 0.0 { half } else { 0.0 });
+        let largest = of.abs().max(if of == 0.0 { half } else { 0.0 });
         let places = if half > 0.0 { decimals(largest, 3).min(decimals(half, 2)) } else { decimals(largest, 3) };
         let text = |value: f64| if value.is_finite() { fixed(value, places) } else { "unknown".to_owned() };
         Self { value: text(value), low: text(low), high: text(high), unit: scale.name.clone() }

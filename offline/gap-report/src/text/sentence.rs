@@ -1,7 +1,7 @@
 //! One sentence per physics: what the robot has and the simulation lacks, where, how much. They start with a small letter and
 //! end without a full stop, so that others can be built around them.
 
-use super::amount::{amount, amount_in, degrees, per_cent, size};
+use super::amount::{amount, amount_beside, amount_in, degrees, per_cent, size};
 use super::joints::{joint, joints};
 use super::number::{percent, short, with_unit};
 use super::unit::Scale;
@@ -17,12 +17,22 @@ pub(crate) fn sentence(verdict: &Verdict) -> String {
         Physics::StribeckFriction => facts.stribeck(&at),
         Physics::LoadDependentFriction => facts.load_dependent(&at),
         Physics::Backlash => facts.more(&at, "b", "play"),
+        Physics::CableStretch if facts.is_less("k") => {
+            format!(
+                "the cable of {at} gives way under load less than in the simulation{}",
+                facts.with(", by that of a spring of ", "k")
+            )
+        }
         Physics::CableStretch => {
             format!("the cable of {at} gives way under load{}, which the simulation lacks", facts.with(" like a spring of ", "k"))
         }
         Physics::CableHysteresis => format!(
             "the cable of {at} does not return the way it came: stretching and releasing differ{}, which the simulation lacks",
             facts.with(" over ", "z_m")
+        ),
+        Physics::CableCreep if facts.is_less("J_k") => format!(
+            "the cable of {at} goes on stretching under a steady load less than in the simulation{}",
+            facts.with(", with a time constant of ", "T_k")
         ),
         Physics::CableCreep => format!(
             "the cable of {at} goes on stretching under a steady load{}, which the simulation lacks",
@@ -75,6 +85,11 @@ impl Facts<'_> {
         self.parameter(name).map_or_else(String::new, |parameter| format!("{before}{}", amount(&size(parameter))))
     }
 
+    /// Has the robot less of it than the simulation?
+    fn is_less(&self, name: &str) -> bool {
+        self.parameter(name).is_some_and(|parameter| parameter.value < 0.0)
+    }
+
     /// The value alone.
     fn bare(&self, before: &str, name: &str, after: &str) -> String {
         let text = |parameter: &Parameter| format!("{before}{}{after}", with_unit(parameter.value.abs(), &parameter.unit));
@@ -107,7 +122,13 @@ impl Facts<'_> {
     }
 
     fn load_dependent(&self, at: &str) -> String {
-        let by = self.parameter("mu_l").map_or_else(String::new, |mu| format!(" by {} of it", amount_in(mu, &per_cent())));
+        let by = self.parameter("mu_l").map_or_else(String::new, |mu| format!(" by {} of it", amount_in(&size(mu), &per_cent())));
+        if self.is_less("mu_l") {
+            return format!(
+                "friction in {at} grows with load less than in the simulation{}{by}",
+                if by.is_empty() { "" } else { "," }
+            );
+        }
         format!("friction in {at} grows with load{by}, which the simulation lacks")
     }
 
@@ -158,7 +179,9 @@ impl Facts<'_> {
                 let by = self.parameter("d_0").map_or_else(String::new, |by| format!(" {}", amount(by)));
                 format!("the motor of {at} gives a constant torque{by} that the simulation lacks")
             }
-            Some(kappa) => format!("the motor of {at} gives {} times the torque that the simulation assumes", amount(kappa)),
+            Some(kappa) => {
+                format!("the motor of {at} gives {} times the torque that the simulation assumes", amount_beside(kappa, 1.0))
+            }
             None => format!("the motor of {at} gives another torque than the simulation assumes"),
         }
     }

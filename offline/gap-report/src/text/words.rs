@@ -104,7 +104,7 @@ fn agreement(report: &Report) -> Option<String> {
     }
     let worst = report.mismatch.excess_rms.iter().max_by(|a, b| (a.value / a.noise_floor).total_cmp(&(b.value / b.noise_floor)))?;
     let (value, floor) = (as_given(worst.value, &worst.unit), as_given(worst.noise_floor, &worst.unit));
-    Some(format!("largest difference {value} where noise alone gives {floor}"))
+    Some(format!("largest difference beyond noise {value}, noise alone {floor}"))
 }
 
 fn left_over(report: &Report) -> Option<String> {

@@ -156,7 +156,7 @@ pub struct Mismatch {
     pub extra: Extra,
 }
 
-/// Residual of a channel.
+/// What a residual has beyond noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExcessRms {
     /// The channel.

@@ -68,6 +68,24 @@ fn each_physics_says_what_the_robot_has() {
             &[("mu_l", 0.2)],
             "Friction in the elbow joint grows with load by 20.0 % (18.0 to 22.0) of it, which the simulation lacks.",
         ),
+        (
+            P::LoadDependentFriction,
+            elbow,
+            &[("mu_l", -0.05)],
+            "Friction in the elbow joint grows with load less than in the simulation, by 5.00 % (4.50 to 5.50) of it.",
+        ),
+        (
+            P::CableStretch,
+            elbow,
+            &[("k", -5700.0)],
+            "The cable of the elbow joint gives way under load less than in the simulation, by that of a spring of 5700 N m/rad (5130 to 6270).",
+        ),
+        (
+            P::CableCreep,
+            elbow,
+            &[("T_k", 42.0), ("J_k", -0.001)],
+            "The cable of the elbow joint goes on stretching under a steady load less than in the simulation, with a time constant of 42.0 s (37.8 to 46.2).",
+        ),
         (P::Backlash, elbow, &[("b", 0.0021)], "The elbow joint has 2.10 mrad (1.89 to 2.31) of play that the simulation lacks."),
         (
             P::CableStretch,

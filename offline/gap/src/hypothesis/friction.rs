@@ -1,7 +1,7 @@
 //! Friction on the motor's or the link's side, and friction that fades with heat.
 
 use super::dictionary::{Dictionary, size, times};
-use super::{Bound, Family, product};
+use super::{Bound, Family, Valley, product};
 use crate::problem::Channel;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
@@ -35,7 +35,7 @@ pub(super) const BEFORE_S: [f64; 2] = [0.5, 4.0];
 const BEFORE_MOST_S: f64 = 8.0;
 const BEFORE_MOST: f64 = 0.5;
 /// Its name in a shape.
-pub(crate) const BEFORE: &str = "before";
+pub(super) const BEFORE: &str = "before";
 
 const BY_LOAD: &str = "load_dependent_friction";
 /// Forms of friction before a cable, and behind it: for any load, that of the links alone, and their weight.
@@ -124,6 +124,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
                     heated.iter().flat_map(|heat| starts.iter().map(move |s| [heat, &s[..]].concat())).collect(),
                     move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],
                 )
+                .lying_in(Valley::Long)
                 .penalised(2.0),
             );
         }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 pub use dictionary::{Column, Dictionary};
 pub(crate) use environment::WALL;
 pub use environment::direction;
-pub(crate) use friction::{AT_MOTOR, BEFORE, STRIBECK_RANGE};
+pub(crate) use friction::{AT_MOTOR, STRIBECK_RANGE};
 pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
 pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
@@ -92,6 +92,19 @@ pub struct Family {
     pub least: f64,
     /// Parts of its one column: of what it explains, the first has to bear it out.
     apart: Option<Arc<Columns>>,
+    /// How the numbers of its shape lie.
+    pub valley: Valley,
+}
+
+/// How the numbers of a shape lie where the misfit is least: what it takes to find them from the grid's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Valley {
+    /// Each by itself.
+    Plain,
+    /// One makes up for another, and both are known sharply: a memory that the motion shows in every sample.
+    Sharp,
+    /// One makes up for another: how slow, and since when.
+    Long,
 }
 
 impl std::fmt::Debug for Family {
@@ -129,6 +142,7 @@ impl Family {
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
             least: 0.0,
             apart: None,
+            valley: Valley::Plain,
         }
     }
 
@@ -163,6 +177,7 @@ impl Family {
             columns: Arc::new(columns),
             least: 0.0,
             apart: None,
+            valley: Valley::Plain,
         }
     }
 
@@ -236,6 +251,13 @@ impl Family {
     pub fn borne_out(mut self, least: f64, parts: impl Fn(&Dictionary) -> Vec<Column> + Send + Sync + 'static) -> Self {
         self.least = least;
         self.apart = Some(Arc::new(move |dictionary, _| parts(dictionary)));
+        self
+    }
+
+    /// With numbers that lie in such a valley.
+    #[must_use]
+    pub fn lying_in(mut self, valley: Valley) -> Self {
+        self.valley = valley;
         self
     }
 

@@ -2,7 +2,7 @@
 
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, heat};
-use super::{Bound, Column, Family, hysteresis, product};
+use super::{Bound, Column, Family, Valley, hysteresis, product};
 use crate::motion::Motion;
 use crate::problem::{Channel, Pair};
 use crate::run::Run;
@@ -183,13 +183,13 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     all.push(family.penalised(1.0));
     hysteresis::push(dictionary, j, usual, all);
     let begun: Settled = |s| 1.0 - (-s[1].clamp(0.0, BEGUN * s[0]) / s[0]).exp();
-    for (form, shape, grid, settled) in [
-        ("settled at the start", &[("T_k", true)][..], product(&[&CREEP_S]), (|_| 1.0) as Settled),
-        ("begun before the start", &[("T_k", true), (BEFORE, true)], product(&[&CREEP_S, &BEFORE_S]), begun),
+    for (form, shape, grid, settled, valley) in [
+        ("settled at the start", &[("T_k", true)][..], product(&[&CREEP_S]), (|_| 1.0) as Settled, Valley::Plain),
+        ("begun before the start", &[("T_k", true), (BEFORE, true)], product(&[&CREEP_S, &BEFORE_S]), begun, Valley::Long),
     ] {
         let columns = move |d: &Dictionary, s: &[f64]| vec![d.strain_of(j, crept(d, j, s[0], settled(s)))];
         let family = Family::shaped("cable_creep", &[j], form, TRANSMISSION, &[Bound::Positive], shape, grid, columns);
-        all.push(family.penalised(1.0));
+        all.push(family.lying_in(valley).penalised(1.0));
     }
     if dictionary.problem.robot.simulates_itself {
         // Where it has crept before: that dies away.
@@ -224,6 +224,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                 grid,
                 move |d, s| vec![d.strain_of(j, heat(d, j, &[s[0], s[1].min(most)]))],
             )
+            .lying_in(Valley::Long)
             .penalised(penalty),
         );
     }
@@ -301,7 +302,7 @@ fn push_ground(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             vec![d.effort_of(j, memory, false), d.effort_of(j, position(d, j), false)]
         },
     );
-    all.push(family.penalised(3.0));
+    all.push(family.lying_in(Valley::Sharp).penalised(3.0));
 }
 
 /// Memory of a deflection, by midpoints in steps between the samples, where the deflection is a cubic; the first samples are
