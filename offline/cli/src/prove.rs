@@ -31,8 +31,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let seed = wish.seed.to_string();
     let out = wish.out.as_os_str();
     let given = ["--matrix", wish.matrix, "--seed", &seed, "--jobs", &jobs, "--out"].map(OsStr::new);
+    let when = if wish.out.join("reports").exists() { "of this trial" } else { "before any answer" };
     call(&generate, given.into_iter().chain([out]))?;
-    say!("hash of the sealed truths, before any answer: {}", sha256(&read(&wish.out.join("manifest.json"))?));
+    say!("hash of the sealed truths, {when}: {}", sha256(&read(&wish.out.join("manifest.json"))?));
     call(&score, [OsStr::new("run"), out, OsStr::new("--tool"), own.as_os_str(), OsStr::new("--jobs"), OsStr::new(&jobs)])?;
     call(&score, [out])?;
 

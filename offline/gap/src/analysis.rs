@@ -415,7 +415,9 @@ fn analyse_with(
     let from_recording = from_recording && !apart.is_empty();
     if !apart.is_empty() {
         // All or none: residuals of which some hold the simulation's own and others do not are no one problem.
-        quality.extend(only_taught(&runs, &comparable));
+        if given.iter().all(|one| one.sim.is_some()) {
+            quality.extend(only_taught(&runs, &comparable));
+        }
         for (run, comparable) in runs.iter_mut().zip(&comparable) {
             apart.extend(run.1.take().filter(|_| *comparable));
         }

@@ -10,9 +10,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 ///
 /// # Errors
 ///
-/// The first case that could not be made.
+/// The first case that could not be made; a truth that is no longer what was published.
 pub fn make(orders: &[Order], out: &Path, jobs: usize) -> Result<(), String> {
     std::fs::create_dir_all(out).map_err(|error| format!("{}: {error}", out.display()))?;
+    unchanged(out)?;
     let (next, troubles) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..jobs.max(1) {
@@ -34,6 +35,26 @@ pub fn make(orders: &[Order], out: &Path, jobs: usize) -> Result<(), String> {
         return Err(first.clone());
     }
     manifest(out).map_err(|error| format!("{}: {error}", out.display()))
+}
+
+/// Refuses to go on where a truth was changed after its hash was published: the manifest is written anew.
+fn unchanged(out: &Path) -> Result<(), String> {
+    let path = out.join("manifest.json");
+    if !path.is_file() {
+        return Ok(());
+    }
+    let trouble = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+    let published: serde_json::Value = std::fs::read(&path)
+        .map_err(|error| trouble(&error))
+        .and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| trouble(&error)))?;
+    let sealed = seal::commitments(&out.join("sealed")).map_err(|error| trouble(&error))?;
+    match sealed.iter().find(|(case, hash)| published["cases"].get(*case).is_some_and(|known| known != *hash)) {
+        Some((case, _)) => Err(format!(
+            "{}: not what the manifest says; it was changed after publication: begin another folder",
+            out.join("sealed").join(case).with_extension("json").display()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// The public list of hashes, over every truth that stands in the folder.

@@ -65,6 +65,13 @@ fn jobs_change_nothing_and_a_second_call_resumes() {
     std::fs::remove_dir_all(&lost).unwrap();
     batch::make(&orders, &a, 2).unwrap();
     assert!(made == tree(&a), "resuming changed a file");
+
+    // A truth that was changed after its hash was published is not published anew.
+    let one = std::fs::read_dir(a.join("sealed")).unwrap().next().unwrap().unwrap().path();
+    let text = std::fs::read_to_string(&one).unwrap().replacen('5', "6", 1);
+    std::fs::write(&one, text).unwrap();
+    let error = batch::make(&orders, &a, 1).err().unwrap();
+    assert!(error.contains("changed after publication") && error.contains("sealed/"), "{error}");
     for path in [a, b] {
         std::fs::remove_dir_all(path).unwrap();
     }

@@ -135,11 +135,15 @@ pub fn judge(truth: &Truth, report: Option<&Report>) -> Judged {
     }
 }
 
-/// Whether the verdict names the joint of the effect and, but for a coupling, no other.
+/// Whether the verdict names the joint of the effect and no other; of a coupling the one that is moved and the one that moves it.
 fn joint_right(truth: &Truth, effect: &Effect, verdict: Option<&Verdict>) -> Option<bool> {
     let name = effect.joint_name.as_deref()?;
     let Some(verdict) = verdict else { return Some(false) };
     let said = &verdict.location.joint;
+    if let Some(mover) = truth.mover(effect).filter(|_| verdict.physics == effect.physics) {
+        // Who is dragged along by whom.
+        return Some(said.len() == 2 && said[0] == name && &said[1] == mover);
+    }
     let most = if verdict.physics == "joint_coupling" { 2 } else { 1 };
     // the geometry between two joints may be put down to either of them
     let next = effect.joint.and_then(|joint| truth.joints.get(joint)).filter(|_| effect.physics == "link_geometry");

@@ -1,6 +1,6 @@
 //! Lets the tool answer every case, one process per case, and publishes the hashes of its reports.
 
-use crate::verify::{manifest, sha256, write_whole};
+use crate::verify::{manifest, read, sha256, write_whole};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 ///
 /// # Errors
 ///
-/// A folder without a manifest; cases that get no report are told on standard error only.
+/// A folder without a manifest; a report that is no longer what was published (lost ones are asked for again). Cases that get no report are
+/// told on standard error only.
 pub fn run(folder: &Path, tool: &Path, jobs: usize) -> Result<usize, String> {
     let cases: Vec<String> = manifest(&folder.join("manifest.json"))?.into_keys().collect();
+    let published = folder.join("reports").join("manifest.json");
+    if published.is_file() {
+        // It is written anew; what was changed since must not get into it.
+        drop(read(&manifest(&published)?, |case| report(folder, case), true)?);
+    }
     let (next, troubles) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     std::thread::scope(|scope| {
         for _ in 0..jobs.max(1) {

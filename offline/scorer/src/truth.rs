@@ -17,6 +17,9 @@ pub struct Effect {
     /// Parameters of the vocabulary, joint side, SI.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
+    /// What is no parameter of the vocabulary: of a coupling the joint that moves, `from`, counted from 1.
+    #[serde(default)]
+    pub details: BTreeMap<String, f64>,
     /// Start and end, s; without it the whole run.
     #[serde(default)]
     pub interval: Option<[f64; 2]>,
@@ -68,6 +71,12 @@ impl Effect {
 }
 
 impl Truth {
+    /// Name of the joint that moves the one of a coupling.
+    pub fn mover(&self, effect: &Effect) -> Option<&String> {
+        let from = effect.details.get("from").filter(|_| effect.physics == "joint_coupling")?;
+        self.joints.get((*from as usize).checked_sub(1)?)
+    }
+
     /// Severity that the case is counted under: the one asked for, or, where a real robot could not have reached it, the level
     /// next to the one reached. 0 for a null case.
     pub fn level(&self) -> f64 {

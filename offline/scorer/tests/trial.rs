@@ -186,15 +186,23 @@ fn coupling_names_two_joints_and_geometry_either_side() {
     let folder = Folder::new("joints");
     let coupling = json!({"physics": "joint_coupling", "joint": 2, "joint_name": "elbow", "parameters": {"c_ij": -0.01}, "severity_wanted": 1.0, "severity": 1.0});
     let geometry = json!({"physics": "link_geometry", "joint": 1, "joint_name": "shoulder", "parameters": {"d_alpha": 0.01}, "severity_wanted": 1.0, "severity": 1.0});
-    folder.seal("a", &truth("a", "single", &json!([coupling])));
+    folder.seal("a", &truth("a", "single", &json!([coupling.clone()])));
     folder.seal("b", &truth("b", "single", &json!([geometry])));
     folder.seal("c", &truth("c", "single", &json!([coulomb(1.0, 1.0)])));
     folder.answer("a", &report("explained", &[verdict(1, "joint_coupling", &["shoulder", "elbow"], 0.9, &json!([]), &[])]));
     folder.answer("b", &report("explained", &[verdict(1, "link_geometry", &["elbow"], 0.9, &json!([]), &[])]));
     // naming every joint is naming none
     folder.answer("c", &report("explained", &[verdict(1, "coulomb_friction", &["shoulder", "elbow"], 0.9, &json!([]), &[])]));
+    // The elbow is dragged along by the shoulder, not the reverse.
+    let mut dragged = coupling.clone();
+    dragged["details"] = json!({"from": 1});
+    for (id, said) in [("d", ["elbow", "shoulder"]), ("e", ["shoulder", "elbow"]), ("f", ["elbow", "insertion"])] {
+        folder.seal(id, &truth(id, "single", &json!([dragged])));
+        folder.answer(id, &report("explained", &[verdict(1, "joint_coupling", &said, 0.9, &json!([]), &[])]));
+    }
     let judged = folder.score().judged;
-    assert_eq!(judged.iter().map(|case| case.joint).collect::<Vec<_>>(), [Some(true), Some(true), Some(false)]);
+    let found: Vec<_> = judged.iter().map(|case| case.joint).collect();
+    assert_eq!(found, [true, true, false, true, false, false].map(Some));
 }
 
 #[test]
@@ -291,6 +299,12 @@ fn a_flipped_byte_is_seen() {
         let error = trial::trial(&folder.0, false).err().unwrap();
         assert!(error.contains(trouble) && error.contains(file), "{error}");
     }
+    // Who lets the tool go on does not publish what was changed.
+    let folder = make("flip-and-go-on");
+    assert_eq!(run::run(&folder.0, Path::new("/bin/true"), 1), Ok(1));
+    flip(&folder.0.join("reports/a/report.json"));
+    let error = run::run(&folder.0, Path::new("/bin/true"), 1).err().unwrap();
+    assert!(error.contains("changed after publication"), "{error}");
 }
 
 #[test]
