@@ -285,7 +285,7 @@ impl Drive {
         motor.coulomb / motor.width + motor.viscous + self.on_motor.iter().map(slope).sum::<f64>()
     }
 
-    /// Damping of the cable with every effect acting, or with none, whichever is more.
+    /// Damping of the cable, at most: its own, and what every effect adds.
     pub(crate) fn steepest_damping(&self) -> f64 {
         let area = self.nominal.radius_m * self.nominal.radius_m;
         let cable = self.nominal.cable.at(0.0);
