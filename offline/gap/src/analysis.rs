@@ -652,12 +652,12 @@ pub(crate) fn held_out_of(runs: usize) -> usize {
 
 /// What to know where the effects leave far more of what was held out than of what was fitted, in the channel where that is most.
 fn more_there(found: &Found) -> Option<DataQuality> {
-    let size = |series: Vec<f64>| crate::nominal::rms(series.into_iter());
     let of_cell = |c: usize| {
-        let (_, _, after) = verdicts::held_out(found, c)?;
-        let fitted = size(verdicts::left(found.problem, c, &sized(&found.answer.effects, found.estimates)));
+        let (there, _, after) = verdicts::held_out(found, c)?;
+        let fitted = verdicts::left(found.problem, c, &sized(&found.answer.effects, found.estimates));
         let asked = found.problem.nuisances[c].columns.is_empty();
-        asked.then_some((c, size(after), fitted.max(found.floors[c])))
+        let sizes = (found.held.cells[there].rms(&after), found.problem.cells[c].rms(&fitted).max(found.floors[c]));
+        asked.then_some((c, sizes.0, sizes.1))
     };
     let all = (0..found.problem.cells.len()).filter_map(of_cell).filter(|(_, there, fitted)| *there > MORE_THERE * fitted);
     let asked = !found.answer.effects.is_empty() && !found.is_later_part();
@@ -675,7 +675,7 @@ fn more_there(found: &Found) -> Option<DataQuality> {
 
 /// Times more that is left of what was held out than of what was fitted, where that is most; what noise and the model's own error leave counts as left.
 fn times_more(fitted: &Problem, held: &Problem, floors: &[f64]) -> f64 {
-    let size = |problem: &Problem, cell: usize| crate::nominal::rms(problem.cells[cell].residual.iter().copied());
+    let size = |problem: &Problem, cell: usize| problem.cells[cell].rms(&problem.cells[cell].residual);
     let of_cell = |c: usize| {
         let there = held.cell(fitted.cells[c].channel, fitted.cells[c].index)?;
         let least = floors[c].max(fitted.practical.any[c]);

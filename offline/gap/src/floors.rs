@@ -13,10 +13,7 @@ const NEAR: usize = 3;
 
 /// Noise of a cell, as [`noise_of`] has it, where it says something.
 pub fn floor(cell: &Cell) -> f64 {
-    let mut says = vec![true; cell.rows.len()];
-    for &k in &cell.silent {
-        says[k] = false;
-    }
+    let says = cell.says();
     noise_of(&cell.residual, |k, other| cell.rows[k].0 == cell.rows[other].0 && says[k] && says[other])
 }
 

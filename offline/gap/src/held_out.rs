@@ -17,6 +17,8 @@ const HOLDS: f64 = -0.2;
 /// in most of what they are fitted to.
 const HOLDS_BARELY: f64 = 0.0;
 const BARELY: f64 = 3.0;
+/// By so many times what is asked of an effect a memory has to be ahead of every other physics, if it is in no run that was held out.
+const AHEAD: f64 = 2.0;
 /// Times the noise that an effect has to be large where it is, if it is in no run that was held out.
 const STANDS_OUT: f64 = 1.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.
@@ -177,7 +179,8 @@ impl HeldOut<'_> {
         let cell = main_cell(self.floors, claim, coefficients);
         if self.is_absent(all, k) {
             // In one run and not in the others is what stands out there, and is not what a larger effect leaves.
-            return !barely && is_large(answer, k) && claim.rms_where_it_is(cell, coefficients) > STANDS_OUT * self.floors[cell];
+            let seen = !barely || is_ahead(answer, k, thresholds);
+            return seen && is_large(answer, k) && claim.rms_where_it_is(cell, coefficients) > STANDS_OUT * self.floors[cell];
         }
         let Some((without, with, own)) = self.without_and_with(all, k, all[k], cell) else { return true };
         if own <= SHOWS * claim.rms(cell, coefficients).powi(2) {
@@ -314,6 +317,16 @@ fn plainer(answer: &Answer, k: usize) -> Option<usize> {
     };
     let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
     effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| own.is_by_load_and_level())
+}
+
+/// Does a memory gain far more than is asked, say more than every other physics in its place, and depend on the way? Held-out runs without it
+/// cannot tell it from a spring that is bent.
+fn is_ahead(answer: &Answer, k: usize, thresholds: &Thresholds) -> bool {
+    let effect = &answer.effects[k];
+    let own = &effect.chosen;
+    let others = effect.rivals.iter().filter(|rival| rival.candidate.family.physics != own.candidate.family.physics);
+    let next = others.map(|rival| rival.score).fold(0.0, f64::max);
+    !own.candidate.is_a_bent_spring() && own.gain.nats >= BARELY * thresholds.nats && own.score - next >= AHEAD * thresholds.nats
 }
 
 /// Is an effect the only one, and accepted barely or bent in many numbers?

@@ -38,12 +38,13 @@ fn heat(found: &Found) -> Vec<HeatMap> {
         }
         let Some(map) = maps.last_mut() else { continue };
         map.rows.push(cell_name(found.robot, cell));
+        let says = cell.says();
         for (r, run) in map.runs.iter_mut().enumerate() {
             let of = &found.problem.pairs[r].real.run;
             let bins = ((of.len() as f64 * of.dt_s / BIN_S).ceil() as usize).max(1);
             let mut each: Vec<Vec<f64>> = vec![Vec::new(); bins];
-            for (&(row_run, i), y) in cell.rows.iter().zip(&cell.residual).filter(|(row, _)| row.0 == r) {
-                debug_assert_eq!(row_run, r);
+            let of_run = cell.rows.iter().zip(&cell.residual).zip(&says).filter(|((row, _), says)| row.0 == r && **says);
+            for ((&(_, i), y), _) in of_run {
                 each[((i as f64 * of.dt_s / BIN_S) as usize).min(bins - 1)].push(*y);
             }
             run.values.push(
@@ -63,7 +64,7 @@ fn shares(found: &Found) -> Vec<Share> {
         .cells
         .iter()
         .zip(found.floors)
-        .map(|(cell, floor)| (rms(cell.residual.iter().copied()).powi(2) / floor.powi(2).max(1e-300) - 1.0).max(0.0))
+        .map(|(cell, floor)| (cell.rms(&cell.residual).powi(2) / floor.powi(2).max(1e-300) - 1.0).max(0.0))
         .collect();
     let mut all = Vec::new();
     for channel in [Channel::JointTorque, Channel::Transmission, Channel::EndEffector] {
@@ -129,26 +130,28 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
     let effect = own.effect(cell, &found.estimates[k].coefficients);
     let after: Vec<f64> = before.iter().zip(&effect).map(|(y, p)| y - p).collect();
     let every = (x.len() / 900).max(1);
-    let points = |y: &[f64]| x.iter().zip(y).step_by(every).map(|(x, y)| (*x, *y)).collect::<Vec<_>>();
+    let says = of.says();
+    let those = |y: &[f64]| x.iter().zip(y).zip(&says).filter(|(_, says)| **says).map(|((x, y), _)| (*x, *y)).collect::<Vec<_>>();
+    let points = |y: &[f64]| those(y).into_iter().step_by(every).collect();
     Signature {
         effect: k as u64 + 1,
         feature,
         error: Quantity::new(format!("Error of {}", cell_quantity(found.robot, of)), cell_unit(found.robot, of)),
         before: points(&before),
         after: points(&after),
-        curve: vec![curve(&x, &effect)],
+        curve: vec![curve(&those(&effect))],
         band: Vec::new(),
         caption: String::new(),
     }
 }
 
 /// Mean of the fitted effect over bins of the feature.
-fn curve(x: &[f64], effect: &[f64]) -> Vec<(f64, f64)> {
+fn curve(effect: &[(f64, f64)]) -> Vec<(f64, f64)> {
     const BINS: usize = 80;
-    let (low, high) = crate::nominal::range(x.iter().copied());
+    let (low, high) = crate::nominal::range(effect.iter().map(|(x, _)| *x));
     let width = (high - low).max(1e-300) / BINS as f64;
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
-    for (x, y) in x.iter().zip(effect) {
+    for (x, y) in effect {
         let bin = &mut sums[(((x - low) / width) as usize).min(BINS - 1)];
         *bin = (bin.0 + x, bin.1 + y, bin.2 + 1.0);
     }
@@ -160,14 +163,17 @@ fn before_after(found: &Found, effect: u64, cell: usize) -> Option<BeforeAfter> 
     let of = &found.held.cells[c];
     // The first held-out run.
     let rows: Vec<usize> = (0..of.rows.len()).filter(|k| of.rows[*k].0 == 0).collect();
+    let says = of.says();
+    // Rows that say nothing are left out.
+    let drawn = |y: &[f64]| rows.iter().map(|k| if says[*k] { y[*k] } else { f64::NAN }).collect();
     let run = &found.held.pairs[0].real.run;
     Some(BeforeAfter {
         effect: Some(effect),
         run: run.id.clone(),
         error: Quantity::new(format!("Error of {}", cell_quantity(found.robot, of)), cell_unit(found.robot, of)),
         t_s: rows.iter().map(|k| run.time_s(of.rows[*k].1)).collect(),
-        before: rows.iter().map(|k| before[*k]).collect(),
-        after: rows.iter().map(|k| after[*k]).collect(),
+        before: drawn(&before),
+        after: drawn(&after),
         noise_floor: Some(found.floors[cell]),
     })
 }

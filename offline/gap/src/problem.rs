@@ -41,6 +41,20 @@ impl Cell {
         Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new() }
     }
 
+    /// Of each row, whether it says something.
+    pub(crate) fn says(&self) -> Vec<bool> {
+        let mut says = vec![true; self.rows.len()];
+        for &k in &self.silent {
+            says[k] = false;
+        }
+        says
+    }
+
+    /// RMS of a series over the rows that say something.
+    pub(crate) fn rms(&self, series: &[f64]) -> f64 {
+        crate::nominal::rms(series.iter().zip(self.says()).filter(|(_, says)| *says).map(|(y, _)| *y))
+    }
+
     /// Makes a series 0 where the cell says nothing.
     pub fn silence<T: Copy + Default>(&self, series: &mut [T]) {
         zero_at(series, &self.silent);
@@ -414,9 +428,22 @@ impl<'a> Problem<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::held;
+    use super::{Cell, Channel, held};
     use crate::motion::{Band, Motion};
     use crate::run::Run;
+
+    #[test]
+    fn rows_that_say_nothing_are_no_rows_without_error() {
+        let mut cell = Cell::new(Channel::JointTorque, 0);
+        cell.rows = (0..5).map(|i| (0, i)).collect();
+        cell.residual = vec![3.0, 0.0, 0.0, -3.0, 0.0];
+        assert!((cell.rms(&cell.residual) - 18.0_f64.sqrt() / 5.0_f64.sqrt()).abs() < 1e-12);
+        // One of them for two reasons.
+        cell.silent = vec![1, 2, 2, 4];
+        assert_eq!(cell.says(), [true, false, false, true, false]);
+        assert!((cell.rms(&cell.residual) - 3.0).abs() < 1e-12);
+        assert!(Cell::new(Channel::JointTorque, 0).rms(&[]).abs() < 1e-12);
+    }
 
     #[test]
     fn a_drive_is_held_until_it_has_moved_away() {

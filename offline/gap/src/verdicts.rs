@@ -15,7 +15,6 @@ use crate::corrected::Corrected;
 use crate::held_out::{Refused, Sized, sized};
 use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window};
 use crate::intervals::{Edge, Estimate};
-use crate::nominal::rms;
 use crate::pictures;
 use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
@@ -484,8 +483,9 @@ fn held_ids(found: &Found) -> Vec<String> {
 fn fits(found: &Found, k: usize) -> Vec<FitFigure> {
     let cell = main_cell(found.floors, &found.answer.effects[k].chosen.candidate, &found.estimates[k].coefficients);
     let of = &found.problem.cells[cell];
-    let Some((_, before, after)) = held_out(found, cell) else { return Vec::new() };
-    let pair = (rms(before.into_iter()), rms(after.into_iter()));
+    let Some((c, before, after)) = held_out(found, cell) else { return Vec::new() };
+    let there = &found.held.cells[c];
+    let pair = (there.rms(&before), there.rms(&after));
     let floor = Some((found.floors[cell], found.floor_methods[cell]));
     let (quantity, unit) = (cell_quantity(found.robot, of), cell_unit(found.robot, of));
     let mut fit = FitFigure::rms(quantity, unit, Space::EquationError, pair, floor, held_ids(found));
@@ -503,7 +503,8 @@ fn excess(found: &Found) -> Vec<ExcessRms> {
         .iter()
         .enumerate()
         .map(|(c, cell)| {
-            let size = rms(cell.residual.iter().copied());
+            let size = cell.rms(&cell.residual);
+            let rows = cell.says().into_iter().filter(|says| *says).count();
             ExcessRms {
                 channel: told(cell.channel),
                 // An axis of the tip is no joint.
@@ -511,7 +512,7 @@ fn excess(found: &Found) -> Vec<ExcessRms> {
                 value: (size * size - found.floors[c].powi(2)).max(0.0).sqrt(),
                 unit: cell_unit(found.robot, cell).to_owned(),
                 noise_floor: found.floors[c],
-                n_effective: Some(cell.rows.len() as f64 / found.answer.scorer.correlation[c]),
+                n_effective: Some(rows as f64 / found.answer.scorer.correlation[c]),
                 extra: gap_report::Extra::default(),
             }
         })

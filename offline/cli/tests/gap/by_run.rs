@@ -112,6 +112,22 @@ fn what_is_in_the_fitted_run_only_is_told_of_that_run() {
 }
 
 #[test]
+fn hysteresis_that_the_last_run_lacks_is_told_from_a_spring_that_hardens() {
+    // Nothing of what was held out speaks for it or against it: it had no name.
+    let folder = Folder::new("bent");
+    let (case, _) = case_of(&folder, "full", 2_377_053_097, "03cdc15dfee7");
+    let report = case.judged(&folder.file("out"));
+    alone(&report, "cable_hysteresis", &[("real_1.csv.gz", 0.0), ("real_2.csv.gz", 0.0)]);
+    let windows = vec![[-1e6, 1e6], [4.17, 120.0], [1e6, 1e6]];
+    let spring = Wanted { severity: Some(10.0), intervals: windows, ..wanted("outside:cubic_stiffness", None, &[]) };
+    let order = Order { seed: 1108, label: "abs108".to_owned(), effects: vec![spring], seconds: 12.0, runs: 3, ..Order::default() };
+    let folder = Folder::new("hardens");
+    let (case, _) = written(&folder, &order);
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::Unmodelled, "{}", report.summary);
+}
+
+#[test]
 fn of_four_runs_that_agree_nothing_is_said() {
     for seed in [79, 80, 81] {
         let folder = Folder::new("four");

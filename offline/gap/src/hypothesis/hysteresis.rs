@@ -29,6 +29,15 @@ pub(crate) const START: &str = "start";
 const ELEMENT: usize = 4;
 /// Where both bend alike nothing depends on the way any more: a soft spring, which has other names.
 const MOST_ALIKE: f64 = 0.93;
+/// From where on they bend about alike, and how near to its limit the straight share stands at it.
+const ABOUT_ALIKE: f64 = 0.9;
+const AT_A_LIMIT: f64 = 1e-3;
+
+/// Is an element a bent spring: is all of it straight or nothing, or does it bend about alike both ways?
+pub(super) fn is_a_bent_spring(family: &Family, shape: &[f64]) -> bool {
+    let at_a_limit = |straight: f64| family.limits[0].iter().any(|limit| (straight - limit).abs() < AT_A_LIMIT);
+    family.physics == PHYSICS && (at_a_limit(shape[0]) || shape[3] > ABOUT_ALIKE)
+}
 
 /// Both forms at a joint whose cable has this load, RMS.
 pub(super) fn push(dictionary: &Dictionary, j: usize, usual: f64, all: &mut Vec<Family>) {

@@ -415,6 +415,11 @@ impl Candidate {
         self.windows.as_ref().zip(other.windows.as_ref()).is_some_and(|(own, its)| own.share_edge(its, SAME_EDGE_S))
     }
 
+    /// Is it hysteresis whose numbers say that nothing depends on the way?
+    pub(crate) fn is_a_bent_spring(&self) -> bool {
+        hysteresis::is_a_bent_spring(&self.family, &self.shape)
+    }
+
     /// Is it friction by load with a level of dry friction beside?
     pub fn is_by_load_and_level(&self) -> bool {
         self.family.physics == "load_dependent_friction" && self.columns.len() > 1
