@@ -93,6 +93,9 @@ pub enum CardError {
     },
 }
 
+/// Golden pairs that a card may have: each is evaluated in every format before the service starts.
+const GOLDEN_MAX: usize = 1000;
+
 /// One golden pair: an input and the output that the network gave when it was exported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Golden {
@@ -352,8 +355,13 @@ fn load(metadata: &BTreeMap<String, String>) -> Result<Option<LoadCard>, CardErr
 }
 
 fn golden(text: &str) -> Result<Vec<Golden>, CardError> {
-    text.lines()
-        .filter(|line| !line.trim().is_empty())
+    let lines = || text.lines().filter(|line| !line.trim().is_empty());
+    let count = lines().count();
+    if count > GOLDEN_MAX {
+        let problem = format!("{count} pairs, expected at most {GOLDEN_MAX}; export the model again with this ravenpose");
+        return Err(CardError::Numbers { key: "ravenpose.golden", problem });
+    }
+    lines()
         .map(|line| {
             let row: [f64; FEATURES + 3] = parse("ravenpose.golden", line)?;
             let output = [row[FEATURES], row[FEATURES + 1], row[FEATURES + 2]];

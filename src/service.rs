@@ -13,6 +13,7 @@ use crate::watch::{self, TICK, Watch};
 use crate::{abort, say, signals};
 use ravenpose_transport::Message;
 use ravenpose_wire::{ARMS, CorrectedPose, flag};
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -71,17 +72,21 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments
             "--check-config" => parsed.check_only = true,
             "--test-hook" => parsed.test_hook = Some(test_hook(&value()?)?),
             "--version" => {
-                println!("ravenposed {} (research software, no clinical use)", env!("CARGO_PKG_VERSION"));
+                print(&format!("ravenposed {} (research software, no clinical use)", env!("CARGO_PKG_VERSION")))?;
                 return Ok(None);
             }
             "--help" | "-h" => {
-                println!("{USAGE}");
+                print(USAGE)?;
                 return Ok(None);
             }
             _ => return Err(format!("unknown argument {argument:?}; see --help")),
         }
     }
     Ok(Some(parsed))
+}
+
+fn print(text: &str) -> Result<(), String> {
+    writeln!(io::stdout(), "{text}").map_err(|cause| format!("standard output cannot be written: {cause}"))
 }
 
 fn test_hook(text: &str) -> Result<TestHook, String> {
@@ -105,7 +110,12 @@ fn start(arguments: &Arguments) -> Result<ExitCode, String> {
     let config = Config::read(&arguments.config).map_err(|error| error.to_string())?;
     let prepared = load_models(&config)?;
     if arguments.check_only {
-        println!("{}: configuration and models are good", arguments.config.display());
+        print(&format!("{}: configuration and models are good", arguments.config.display()))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    // Told to stop while models were loaded: nobody has seen this service yet.
+    if signals::wait(Duration::ZERO) {
+        say("stopped before it ran");
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(core) = config.core {

@@ -688,6 +688,21 @@ fn swap_last_biases(bytes: &mut [u8]) {
 }
 
 #[test]
+fn more_golden_pairs_than_can_be_evaluated_before_the_start_are_refused() {
+    let directory = TempDir::new("models-many");
+    let with = |count: usize| {
+        let many = small().trained().with_golden(|rows| {
+            let first = rows[0].clone();
+            rows.resize(count, first);
+        });
+        load_bytes(&directory, &many.bytes())
+    };
+    assert!(with(1000).is_ok());
+    let line = with(1001).err().expect("refused");
+    assert!(line.contains("property ravenpose.golden: 1001 pairs, expected at most 1000"), "{line}");
+}
+
+#[test]
 fn a_golden_pair_as_exact_as_float32_is_accepted() {
     let directory = TempDir::new("models-float32");
     for onnx in [small().trained(), Onnx::untrained()] {

@@ -482,6 +482,29 @@ fn a_client_that_cannot_be_connected_is_counted_and_costs_the_others_nothing() {
     });
 }
 
+/// Told to stop while it loads its models: it ends without having run.
+#[test]
+fn a_stop_signal_during_the_start_ends_it_before_it_runs() {
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("early");
+        let config = world.config("allow_untrained = true\nallow_degraded = true");
+        let path = world.dir.0.join("service.log");
+        let log = std::fs::File::create(&path).expect("log");
+        let mut service = Process(world.service(&config).stderr(log).spawn().expect("the service starts"));
+        let status = format!("/proc/{}/status", service.0.id());
+        // Signals are taken in order from when they are blocked, before anything is loaded.
+        world.until("blocked", || {
+            let text = std::fs::read_to_string(&status).expect("a process");
+            let blocked = text.lines().find_map(|line| line.strip_prefix("SigBlk:\t")).expect("a mask");
+            u64::from_str_radix(blocked, 16).expect("a mask") & 1 << (libc::SIGTERM - 1) != 0
+        });
+        service.signal(libc::SIGTERM);
+        assert_eq!(service.end().code(), Some(0), "{}", world.log());
+        assert!(world.log().contains("stopped before it ran") && !world.log().contains("running"), "{}", world.log());
+    });
+}
+
 /// And it hears no controller that comes. It says so, and hears it as soon as there is one again.
 #[test]
 fn a_controller_that_cannot_be_connected_is_told_and_then_heard() {

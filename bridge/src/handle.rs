@@ -99,7 +99,8 @@ impl Publisher {
                 self.bell.ring();
                 // The service has the state and works on it: what the next one needs is paid for now.
                 self.writer.prepare();
-                Code::Ok
+                // Counted once, when the connection is tried: the others have the state.
+                if self.writer.take_left_out() > 0 { Code::Send } else { Code::Ok }
             }
             Err(error) => Code::of(&error),
         }

@@ -184,6 +184,8 @@ fn the_consumer_rule_gives_raw_unless_everything_is_right() {
     };
     assert_eq!(rule(&good, 0, 1_004_999_999), (Code::Ok as i32, [4.0, 5.0, 6.0]));
     assert_eq!(rule(&good, 0, 1_005_000_000), (Code::Raw as i32, [1.0, 2.0, 3.0]), "too old");
+    assert_eq!(rule(&good, 0, 999_000_000), (Code::Ok as i32, [4.0, 5.0, 6.0]), "a clock read before");
+    assert_eq!(rule(&good, 0, 998_999_999), (Code::Raw as i32, [1.0, 2.0, 3.0]), "of another clock");
     assert_eq!(rule(&good, 2, 1_000_000_000).0, Code::Argument as i32);
     let mut fallback = good;
     fallback.arm[0].status = ArmStatus::Fallback as u32;

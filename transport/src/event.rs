@@ -4,6 +4,7 @@
 use crate::{Settings, TransportError};
 use iceoryx2::node::Node;
 use iceoryx2::prelude::{ServiceName, ipc};
+use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
 use ravenpose_wire::{ICEORYX2_VERSION, STATE_SERVICE};
 use std::time::Duration;
 
@@ -18,8 +19,28 @@ fn open(settings: &Settings) -> Result<(EventFactory, Node<ipc::Service>), Trans
     };
     let node = crate::link::node(settings)?;
     let name = ServiceName::new(STATE_SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
-    let service = node.service_builder(&name).event().open_or_create().map_err(|cause| unusable(format!("{cause:?}")))?;
+    let service = crate::link::retried(|| node.service_builder(&name).event().open_or_create(), passes)
+        .map_err(|cause| unusable(format!("{cause:?}")))?;
     Ok((service, node))
+}
+
+/// Is it what another party at work on the same service looks like?
+fn passes(cause: EventOpenOrCreateError) -> bool {
+    matches!(
+        cause,
+        EventOpenOrCreateError::SystemInFlux
+            | EventOpenOrCreateError::EventCreateError(
+                EventCreateError::HangsInCreation
+                    | EventCreateError::IsBeingCreatedByAnotherInstance
+                    | EventCreateError::AlreadyExists,
+            )
+            | EventOpenOrCreateError::EventOpenError(
+                EventOpenError::DoesNotExist
+                    | EventOpenError::HangsInCreation
+                    | EventOpenError::IsMarkedForDestruction
+                    | EventOpenError::ServiceInCorruptedState,
+            )
+    )
 }
 
 /// Wakes the service after a state was sent.

@@ -99,20 +99,23 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
         prefix: settings.prefix.clone(),
     };
     let name = ServiceName::new(T::SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
-    let service = retried(|| {
-        node.service_builder(&name)
-            .publish_subscribe::<T>()
-            // Overflow drops the oldest: a slow reader never holds the writer up.
-            .enable_safe_overflow(true)
-            // A late reader gets the last message at once, and tells from its time how old it is.
-            .history_size(HISTORY)
-            .subscriber_max_buffer_size(DEPTH_MAX)
-            .subscriber_max_borrowed_samples(BORROWED_MAX)
-            .max_publishers(1)
-            .max_subscribers(T::MAX_READERS)
-            .max_nodes(T::MAX_READERS + 8)
-            .open_or_create()
-    })
+    let service = retried(
+        || {
+            node.service_builder(&name)
+                .publish_subscribe::<T>()
+                // Overflow drops the oldest: a slow reader never holds the writer up.
+                .enable_safe_overflow(true)
+                // A late reader gets the last message at once, and tells from its time how old it is.
+                .history_size(HISTORY)
+                .subscriber_max_buffer_size(DEPTH_MAX)
+                .subscriber_max_borrowed_samples(BORROWED_MAX)
+                .max_publishers(1)
+                .max_subscribers(T::MAX_READERS)
+                .max_nodes(T::MAX_READERS + 8)
+                .open_or_create()
+        },
+        passes,
+    )
     .map_err(|cause| match cause {
         PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
             PublishSubscribeOpenError::IncompatibleTypes
@@ -132,31 +135,35 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
 }
 
 /// Tries for a second: another party may be creating or removing the same service at this moment.
-fn retried<R>(
-    mut open: impl FnMut() -> Result<R, PublishSubscribeOpenOrCreateError>,
-) -> Result<R, PublishSubscribeOpenOrCreateError> {
+pub(crate) fn retried<R, E: Copy>(mut open: impl FnMut() -> Result<R, E>, passes: impl Fn(E) -> bool) -> Result<R, E> {
     const TRIES: u32 = 200;
     const PAUSE: Duration = Duration::from_millis(5);
     for _ in 1..TRIES {
         match open() {
-            Err(
-                PublishSubscribeOpenOrCreateError::SystemInFlux
-                | PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(
-                    PublishSubscribeCreateError::HangsInCreation
-                    | PublishSubscribeCreateError::IsBeingCreatedByAnotherInstance
-                    | PublishSubscribeCreateError::AlreadyExists,
-                )
-                | PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
-                    PublishSubscribeOpenError::DoesNotExist
-                    | PublishSubscribeOpenError::HangsInCreation
-                    | PublishSubscribeOpenError::IsMarkedForDestruction
-                    | PublishSubscribeOpenError::ServiceInCorruptedState,
-                ),
-            ) => std::thread::sleep(PAUSE),
+            Err(cause) if passes(cause) => std::thread::sleep(PAUSE),
             done => return done,
         }
     }
     open()
+}
+
+/// Is it what another party at work on the same service looks like?
+fn passes(cause: PublishSubscribeOpenOrCreateError) -> bool {
+    matches!(
+        cause,
+        PublishSubscribeOpenOrCreateError::SystemInFlux
+            | PublishSubscribeOpenOrCreateError::PublishSubscribeCreateError(
+                PublishSubscribeCreateError::HangsInCreation
+                    | PublishSubscribeCreateError::IsBeingCreatedByAnotherInstance
+                    | PublishSubscribeCreateError::AlreadyExists,
+            )
+            | PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
+                PublishSubscribeOpenError::DoesNotExist
+                    | PublishSubscribeOpenError::HangsInCreation
+                    | PublishSubscribeOpenError::IsMarkedForDestruction
+                    | PublishSubscribeOpenError::ServiceInCorruptedState,
+            )
+    )
 }
 
 /// Counts a connection that cannot be made: iceoryx2 by itself would say it only in a log that is off here.
