@@ -6,7 +6,7 @@ use crate::{output, plot, registration};
 use arm::Side;
 use recordings::Recording;
 use recordings::open::{Opened, open};
-use recordings::pairs::{Clock, ClockChoice, Options, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
+use recordings::pairs::{Clock, ClockChoice, Options, RegistrationChoice, Reported, TRUTH, Truth, pair, stated_offset_s};
 use recordings::save::{self, StateFormat};
 use recordings::stream::{self, Record};
 use recordings::tidy;
@@ -45,6 +45,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     if let Some(format @ (StateFormat::StateFile | StateFormat::Columns235 | StateFormat::Columns252)) = format {
         return Err(format!("{}: {format:?} holds no true tip; name the output .csv, .mcap, .bag or .parquet", out.display()));
     }
+    let is_table = out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+    if format.is_none() && !is_table {
+        return Err(format!("{}: not a format of pairs; name the output .csv, .mcap, .bag or .parquet", out.display()));
+    }
     if [run].into_iter().chain(wish.truth).any(|input| same_file(input, out)) {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
@@ -52,6 +56,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     let recording = plot::read_with(run, tidy::Options { orientation: true, ..tidy::Options::default() })?;
     let separate = wish.truth.map(plot::read).transpose()?;
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
+    let holds_truth = |recording: &Recording| TRUTH.iter().all(|name| recording.column(name).is_some());
+    if separate.is_none() && !holds_truth(&recording) {
+        return Err(format!("{}: holds no true position ({}); give it with --truth", run.display(), TRUTH.join(", ")));
+    }
     let frames = Truth::from_recording(separate.as_ref().unwrap_or(&recording)).map_err(|error| error.to_string())?;
     let mut options = if wish.same { Options::same_clock_and_frame() } else { Options::default() };
     options.mounting_known = wish.mounting_known;

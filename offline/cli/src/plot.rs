@@ -1,5 +1,6 @@
 //! `ravenpose plot`: an overview of a run as one page.
 
+use crate::convert::same_file;
 use crate::output;
 use recordings::Recording;
 use recordings::open::{Opened, open};
@@ -9,6 +10,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 pub(crate) fn run(input: &Path, out: &Path) -> Result<ExitCode, String> {
+    if same_file(input, out) {
+        return Err(format!("{}: is both input and output; choose another output", out.display()));
+    }
     let recording = read(input)?;
     let options = plot::Options::default();
     let svg = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));

@@ -132,6 +132,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         recipe = recipe.for_tables();
     }
     if let Some(epochs) = wish.epochs {
+        if epochs == 0 {
+            return Err("--epochs 0: must be 1 or more".to_owned());
+        }
         recipe.epochs = epochs;
     }
     if let Some(first) = wish.first.as_deref().and_then(First::of_name) {

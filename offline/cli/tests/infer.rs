@@ -123,6 +123,10 @@ fn bad_tables_are_refused_by_line_and_column_and_leave_nothing() {
         assert!(words.contains(expected) && words.lines().count() == 1, "wanted {expected}, got {words}");
         assert_eq!(std::fs::read_dir(folder.file("")).expect("folder").count(), 1, "nothing but the input is left");
     }
+    std::fs::write(&input, with(0, "1")).expect("table");
+    let done = infer(&untrained(), &input, &input);
+    assert!(done.status.code() == Some(2) && errors(&done).contains("is both input and output"), "{}", errors(&done));
+    assert_eq!(std::fs::read_to_string(&input).expect("table"), with(0, "1"));
     let done = infer(&untrained(), &folder.file("absent.csv"), &out);
     assert_eq!(done.status.code(), Some(2));
 }

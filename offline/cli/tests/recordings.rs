@@ -140,6 +140,15 @@ fn pairs_of_a_simulated_run_are_its_error() {
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.file("pairs.report.json")).expect("report")).expect("JSON");
     assert_eq!(report["pairs"].as_u64(), Some(rows.len() as u64));
+    // A run without a true position has no error of zero.
+    let (run, alone) = (out.join("run_0001.mcap"), folder.file("alone.rvs"));
+    done(&["convert", text(&run), text(&alone)]);
+    let pairs = folder.file("alone.csv");
+    refused(&ravenpose(&["pair", text(&alone), "--same", "--out", text(&pairs)]), &["alone.rvs", "give it with --truth"]);
+    refused(&ravenpose(&["pair", text(&run), "--same", "--out", text(&folder.file("p.csv.gz"))]), &["not a format of pairs"]);
+    assert!(!pairs.exists());
+    // Nor is a run replaced by its picture.
+    refused(&ravenpose(&["plot", text(&run), "--out", text(&run)]), &["both input and output"]);
 }
 
 #[test]

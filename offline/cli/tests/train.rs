@@ -312,4 +312,5 @@ fn what_cannot_be_trained_on_is_one_line_and_status_2() {
     refused(&["--inputs", "jpos_1_rad", "--truth", "truth_jpos_1_rad"], "no column truth_jpos_1_rad");
     refused(&["--inputs", "jpos_1_rad", "--truth", "jpos_1_rad"], "at least 3 are needed");
     refused(&["--truth-hz", "0"], "--truth-hz 0");
+    refused(&["--epochs", "0"], "--epochs 0: must be 1 or more");
 }

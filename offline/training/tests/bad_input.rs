@@ -46,6 +46,18 @@ fn a_recording_without_truth_is_named() {
 }
 
 #[test]
+fn a_table_whose_time_begins_anew_is_read_to_its_end() {
+    let folder = Folder::new("sessions");
+    let mut text = "u,t_s,y\n".to_owned();
+    for k in 0..200 {
+        let _ = writeln!(text, "{k},{},{}", 0.1 * f64::from(k % 50), 2 * k);
+    }
+    let reading = Reading { columns: Some(columns(&["u"], &["y"])), truth_hz: 10.0, ..Reading::default() };
+    let set = training::data::read(&[folder.text("sessions.csv", &text)], &reading, &mut |_, _| {}).expect("a table");
+    assert_eq!(set.trajectories.iter().map(training::data::Trajectory::rows).sum::<usize>(), 200);
+}
+
+#[test]
 fn one_trajectory_is_too_few() {
     let folder = Folder::new("one");
     let found = line(&folder, &runs(&folder, 1, 1.0, ".mcap"), None);

@@ -145,6 +145,49 @@ fn the_service_tells_the_network_the_friction_that_training_appended() {
 }
 
 #[test]
+fn truths_belong_to_the_nearer_state_and_rows_count_from_the_first_of_them() {
+    let folder = Folder::new("late-truths");
+    let files = runs(&folder, 1, 20.0, ".mcap");
+    let rewritten = |name: &str, keep: &mut dyn FnMut(Record) -> Option<Record>| {
+        let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
+        let file = folder.file(name);
+        let mut sink = recordings::save::create_states(&file, recordings::save::StateFormat::Mcap, &[]).expect("file");
+        while let Some(record) = source.next().expect("record") {
+            if let Some(record) = keep(record) {
+                sink.write(&record).expect("written");
+            }
+        }
+        sink.finish().expect("written");
+        file
+    };
+    let reading = Reading { plays: small("default").plays(), truth_hz: 1000.0, ..Reading::default() };
+    let read = |file| data::read(&[file], &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
+    // States of 100 Hz, and cameras 7 ms after each, 3 ms before the next.
+    let (mut begun_ns, mut states) = (None, 0);
+    let slow = rewritten("slow.mcap", &mut |record| {
+        let ns = record.time_ns();
+        let since = (ns - *begun_ns.get_or_insert(ns)) / 1_000_000 % 10;
+        let keeps = matches!(&record, Record::State(_)) && since == 0 || matches!(&record, Record::Truth(_)) && since == 7;
+        states += u32::from(keeps && matches!(&record, Record::State(_)));
+        keeps.then_some(record)
+    });
+    let rows = read(slow).rows();
+    assert!(states > 500 && rows + 10 > states as usize, "{rows} rows of {states} states");
+    // The memory has followed for three seconds when the first truth comes.
+    let whole = read(files[0].clone());
+    let settled_s = whole.settled_after_s;
+    let late = read(rewritten("late.mcap", &mut |record| {
+        let ns = record.time_ns();
+        let early = ns - *begun_ns.get_or_insert(ns) < 3_000_000_000;
+        (!(early && matches!(&record, Record::Truth(_)))).then_some(record)
+    }));
+    match (settled_s, late.settled_after_s) {
+        (Some(of_whole), Some(of_late)) => assert!((of_late - (of_whole - 3.0).max(0.0)).abs() < 0.02, "{of_whole} {of_late}"),
+        (of_whole, of_late) => panic!("twenty seconds settle no memory: {of_whole:?} {of_late:?}"),
+    }
+}
+
+#[test]
 fn rows_with_a_young_memory_are_those_of_a_run_that_began_then() {
     let folder = Folder::new("young");
     let files = runs(&folder, 1, 6.0, ".mcap");

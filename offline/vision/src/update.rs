@@ -16,6 +16,8 @@ const FRESH: usize = 8;
 
 /// Bounds on motion between frames, px: least, and most before everything is searched anew.
 const NEAR_PX: [f64; 2] = [6.0, 30.0];
+/// Bounds after many lost frames, px: of one that is measured they are those of the widest guided search.
+const LOST_PX: f64 = 1.4 * NEAR_PX[1];
 
 /// State of a circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +114,7 @@ impl Ledger {
                 *frames = 0;
             }
         }
-        self.near_px *= 1.6;
+        // Once everything is searched anew, wider bounds say no more; the first frame that is found brings them back.
+        self.near_px = (1.6 * self.near_px).min(LOST_PX);
     }
 }

@@ -31,7 +31,8 @@ pub struct Truth {
 }
 
 const REPORTED: [&str; 3] = ["x_m", "y_m", "z_m"];
-const TRUTH: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
+/// Columns of the true tip in a run's own table.
+pub const TRUTH: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
 const QUATERNION: [&str; 4] = ["qw", "qx", "qy", "qz"];
 const NEEDS: &str = "time (t_s) and the tip's position on both sides (x_mm, y_mm, z_mm and truth_x_mm, truth_y_mm, truth_z_mm)";
 

@@ -49,7 +49,7 @@ pub(super) fn read(file: &Path, reading: &Reading, notes: &mut Vec<String>) -> R
     pairing.found.is_measured = is_truth_measured(source.metadata());
     loop {
         match source.next().map_err(|error| TrainingError::Recording(error.to_string()))? {
-            Some(Record::State(state)) => pairing.state(state),
+            Some(Record::State(state)) => pairing.state(state)?,
             Some(Record::Truth(truth)) => pairing.truth(&truth)?,
             None => break,
         }
@@ -78,6 +78,8 @@ struct Pairing<'a> {
     young_since_ns: i64,
     young_until_ns: i64,
     state_ns: i64,
+    /// A truth that is too far from the state before it: the next may be near.
+    ahead: Option<Truth>,
     start_ns: Option<i64>,
     next_ns: i64,
     /// Has any state had another run level than 0? A file whose states all have 0 does not say: no arm moves in an e-stop.
@@ -109,6 +111,7 @@ impl<'a> Pairing<'a> {
             young_since_ns: i64::MIN,
             young_until_ns: i64::MIN,
             state_ns: 0,
+            ahead: None,
             start_ns: None,
             next_ns: i64::MIN,
             says_runlevel: false,
@@ -118,7 +121,7 @@ impl<'a> Pairing<'a> {
         }
     }
 
-    fn state(&mut self, state: Box<RavenState>) {
+    fn state(&mut self, state: Box<RavenState>) -> Result<(), TrainingError> {
         let stamp_ns = i64::from(state.hdr_stamp_sec) * 1_000_000_000 + i64::from(state.hdr_stamp_nsec);
         self.state_ns = stamp_ns;
         if state.runlevel != 0 && !std::mem::replace(&mut self.says_runlevel, true) {
@@ -133,6 +136,7 @@ impl<'a> Pairing<'a> {
             self.follow(stamp_ns);
         }
         self.state = Some(state);
+        self.ahead.take().map_or(Ok(()), |truth| self.truth(&truth))
     }
 
     fn follow(&mut self, stamp_ns: i64) {
@@ -154,10 +158,11 @@ impl<'a> Pairing<'a> {
         if truth.side != self.side || truth.time_ns < self.next_ns {
             return Ok(());
         }
-        let Some(state) = self.state.as_deref() else { return Ok(()) };
-        if (truth.time_ns - self.state_ns).abs() > APART_MAX_NS {
-            return Ok(());
+        let early_ns = truth.time_ns.saturating_sub(self.state_ns);
+        if early_ns > APART_MAX_NS {
+            self.ahead = Some(*truth);
         }
+        let Some(state) = self.state.as_deref().filter(|_| early_ns.abs() <= APART_MAX_NS) else { return Ok(()) };
         if self.says_runlevel && state.runlevel != PEDAL_DOWN {
             self.left_out += 1;
             return Ok(());
@@ -282,6 +287,10 @@ impl<'a> Pairing<'a> {
             return Err(TrainingError::NoTruth { file, looked_for });
         }
         self.found.exact.clone_from(&self.found.labels);
+        // The memory follows the states from the first on; rows count from the first truth.
+        if let (Some(begun_ns), Some(start_ns), Some(after_s)) = (self.begun_ns, self.start_ns, &mut self.found.settled_after_s) {
+            *after_s = (*after_s - start_ns.saturating_sub(begun_ns) as f64 * 1e-9).max(0.0);
+        }
         Ok(self.found)
     }
 }

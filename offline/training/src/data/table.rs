@@ -49,7 +49,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
     let reported = of_names(file, &recording, &columns.reported, false)?;
     let name = file.file_name().map_or_else(|| shown(file), |name| name.to_string_lossy().into_owned());
     let mut found = Trajectory { name, ..Trajectory::default() };
-    let mut next_s = f64::NEG_INFINITY;
+    let (mut next_s, mut before_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     let mut left_out = 0;
     let mut memories = Memories { widths: &columns.plays, held: Vec::new() };
     for row in 0..recording.rows() {
@@ -72,6 +72,11 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
             .map(|output| (truth[output][row] - reported.get(output).map_or(0.0, |column| column[row])) as f32)
             .collect();
         found.sketch.add(values.iter().map(|value| *value as f32).chain(labels.iter().copied()));
+        // A session that begins anew is another one, not a part of the last.
+        if time_s < before_s {
+            next_s = f64::NEG_INFINITY;
+        }
+        before_s = time_s;
         if recording.time_s().is_some() && time_s < next_s {
             continue;
         }
