@@ -118,3 +118,21 @@ impl Ledger {
         self.near_px = (1.6 * self.near_px).min(LOST_PX);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn after_however_many_lost_frames_the_first_that_is_measured_guides_the_next() {
+        for lost in [4, 30, 2000] {
+            let (mut ledger, nothing) = (Ledger::new(0, false), [vec![], vec![], vec![]]);
+            ledger.measured(0.0, &Isometry3::identity(), &nothing);
+            (0..lost).for_each(|_| ledger.lost());
+            assert!(ledger.expected(60.0).is_none(), "{lost}: everything is searched anew");
+            ledger.measured(60.0, &Isometry3::identity(), &nothing);
+            let (_, within_px) = ledger.expected(60.03).expect("bounds");
+            assert!(within_px <= NEAR_PX[1], "{lost}: {within_px}");
+        }
+    }
+}
