@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// A damaged input was converted as far as it goes.
-const PARTLY: u8 = 1;
+pub(crate) const PARTLY: u8 = 1;
 
 const OUTPUTS: &str = ".mcap, .bag, .rvs, .txt (235 columns), .252.csv, .csv, .csv.gz or .parquet";
 

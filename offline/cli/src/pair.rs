@@ -53,8 +53,16 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
     let known = wish.cameras.map(registration::read).transpose()?;
-    let recording = plot::read_with(run, tidy::Options { orientation: true, ..tidy::Options::default() })?;
-    let separate = wish.truth.map(plot::read).transpose()?;
+    let (recording, mut status) = plot::read_with(run, tidy::Options { orientation: true, ..tidy::Options::default() })?;
+    let separate = match wish.truth.map(plot::read).transpose()? {
+        None => None,
+        Some((truth, of_truth)) => {
+            if of_truth != ExitCode::SUCCESS {
+                status = of_truth;
+            }
+            Some(truth)
+        }
+    };
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
     let holds_truth = |recording: &Recording| TRUTH.iter().all(|name| recording.column(name).is_some());
     if separate.is_none() && !holds_truth(&recording) {
@@ -98,7 +106,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         registration::write(cameras, &paired.report.registration, &name)?;
         say!("{}: [registration] is that of this run; a constant error of the arm is in it", cameras.display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(status)
 }
 
 /// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that

@@ -216,6 +216,16 @@ fn a_cut_recording_gives_what_stands_before_the_cut_and_says_where() {
     assert!(error.lines().count() == 1 && error.contains("cut.mcap: byte "), "{error}");
     let rows = std::fs::read_to_string(&saved).expect("saved").lines().filter(|line| !line.starts_with('#')).count();
     assert!((100..3000).contains(&rows), "{rows}");
+    // So do a picture and pairs of it.
+    let (page, pairs) = (folder.file("page.html"), folder.file("pairs.csv"));
+    for arguments in [["plot", text(&cut), "--out", text(&page)].as_slice(), &["pair", text(&cut), "--same", "--out", text(&pairs)]]
+    {
+        let output = ravenpose(arguments);
+        let error = errors(&output);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.lines().count() == 1 && error.contains("cut.mcap: byte "), "{error}");
+    }
+    assert!(page.exists() && pairs.exists());
 }
 
 #[test]
