@@ -1,20 +1,19 @@
 //! `ravenpose convert`: a recording of any format into any other.
 
+use crate::output;
 use crate::progress::Progress;
+use crate::read::{told, told_of};
 use arm::Side;
 use recordings::cut::{CutSource, CutTable, Stretch};
 use recordings::open::{Opened, open};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
-use recordings::stream::{Damage, Record, Source, Truth};
+use recordings::stream::{Record, Source, Truth};
 use recordings::table::{self, TableSource};
-use recordings::tidy::{self, StateTable};
+use recordings::tidy::{self, Shown, StateTable};
 use recordings::{Recording, csv};
 use std::path::Path;
 use std::process::ExitCode;
-
-/// A damaged input was converted as far as it goes.
-pub(crate) const PARTLY: u8 = 1;
 
 const OUTPUTS: &str = ".mcap, .bag, .rvs, .txt (235 columns), .252.csv, .csv, .csv.gz or .parquet";
 
@@ -29,33 +28,23 @@ pub(crate) fn stretch(from: Option<f64>, to: Option<f64>) -> Result<Stretch, Str
 }
 
 pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>, stretch: Stretch) -> Result<ExitCode, String> {
-    if same_file(input, out) {
-        return Err(format!("{}: is both input and output; choose another output", out.display()));
-    }
+    output::check_file(out, &[input])?;
     let states = StateFormat::of_name(out);
     let tables = TableFormat::of_name(out);
     let arms = arm.map(arms_of);
-    let damage = match (open(input).map_err(|error| error.to_string())?, states, tables) {
-        (Opened::States(source), Some(format), _) => states_to_states(input, cut(source, stretch), out, format)?,
+    match (open(input).map_err(|error| error.to_string())?, states, tables) {
+        (Opened::States(_), Some(_), _) if arm.is_some() => {
+            Err(format!("{}: states keep the arms that they have; leave --arm out, or name a table as the output", out.display()))
+        }
+        (Opened::States(source), Some(format), _) => states_to_states(input, cut(source, stretch), out, format),
         (Opened::States(source), None, Some(format)) => {
-            let table = states_as_table(cut(source, stretch), format, arms)?;
-            table_to_table(input, table, out, format)?
+            let table = states_as_table(input, cut(source, stretch), stretch, format, arms)?;
+            table_to_table(input, table, out, format)
         }
-        (Opened::Table(source), _, Some(format)) => table_to_table(input, cut_table(input, source, stretch)?, out, format)?,
-        (Opened::Table(_), Some(format), None) => {
-            table_to_states(input, out, format, arms.unwrap_or(Arms::Gold), stretch)?;
-            None
-        }
-        (_, None, None) => return Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
-    };
-    let Some(damage) = damage else { return Ok(ExitCode::SUCCESS) };
-    complain!(
-        "ravenpose: {}: {}: {}; what stands before it was converted, the rest is lost",
-        input.display(),
-        damage.place,
-        damage.what
-    );
-    Ok(ExitCode::from(PARTLY))
+        (Opened::Table(source), _, Some(format)) => table_to_table(input, cut_table(input, source, stretch)?, out, format),
+        (Opened::Table(_), Some(format), None) => table_to_states(input, out, format, arms.unwrap_or(Arms::Gold), stretch),
+        (_, None, None) => Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
+    }
 }
 
 fn cut(source: Box<dyn Source>, stretch: Stretch) -> Box<dyn Source> {
@@ -80,17 +69,13 @@ fn arms_of(name: &str) -> Arms {
     }
 }
 
-pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-}
-
 fn note_all(losses: &[&str]) {
     for loss in losses {
         say!("note: {loss}");
     }
 }
 
-fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, format: StateFormat) -> Result<Option<Damage>, String> {
+fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, format: StateFormat) -> Result<ExitCode, String> {
     note_all(format.losses());
     let metadata = source.metadata().to_vec();
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
@@ -115,22 +100,27 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
         );
     }
     say!("{}: {records} records", out.display());
-    Ok(source.damage().cloned())
+    Ok(source.damage().map_or(ExitCode::SUCCESS, |damage| told_of(input, damage, "converted")))
 }
 
-fn states_as_table(source: Box<dyn Source>, format: TableFormat, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
-    note_all(format.losses_of_states());
-    let table =
-        StateTable::new(source, tidy::Options { arms, all_truth: false, orientation: false }).map_err(|error| error.to_string())?;
-    Ok(Box::new(table))
-}
-
-fn table_to_table(
+/// Reads the stretch a first time to know its columns.
+fn states_as_table(
     input: &Path,
-    mut source: Box<dyn TableSource>,
-    out: &Path,
+    mut first: Box<dyn Source>,
+    stretch: Stretch,
     format: TableFormat,
-) -> Result<Option<Damage>, String> {
+    arms: Option<Arms>,
+) -> Result<Box<dyn TableSource>, String> {
+    note_all(format.losses_of_states());
+    let shown = Shown::in_all_of(first.as_mut()).map_err(|error| error.to_string())?;
+    let Opened::States(again) = open(input).map_err(|error| error.to_string())? else {
+        return Err(format!("{}: changes while it is read; convert it when its recording has ended", input.display()));
+    };
+    let options = tidy::Options { arms, ..tidy::Options::default() };
+    Ok(Box::new(StateTable::showing(cut(again, stretch), &shown, options).map_err(|error| error.to_string())?))
+}
+
+fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, format: TableFormat) -> Result<ExitCode, String> {
     let metadata = source.metadata().to_vec();
     let columns = source.columns().to_vec();
     let mut sink = save::create_table(out, format, &columns, &metadata).map_err(|error| error.to_string())?;
@@ -143,11 +133,11 @@ fn table_to_table(
     }
     sink.finish().map_err(|error| error.to_string())?;
     say!("{}: {rows} rows, {} columns", out.display(), columns.len());
-    Ok(source.damage().cloned())
+    Ok(told(input, source.as_ref(), "converted"))
 }
 
 /// Full states need a time that rises, joints or motors: the strict reader refuses what lacks them.
-fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, stretch: Stretch) -> Result<(), String> {
+fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, stretch: Stretch) -> Result<ExitCode, String> {
     let recording = strict(input)?;
     let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
     for note in &made.notes {
@@ -177,7 +167,7 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, st
     }
     sink.finish().map_err(|error| error.to_string())?;
     say!("{}: {written} states, {:.3} s", out.display(), written as f64 * 1e-3);
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 fn strict(input: &Path) -> Result<Recording, String> {

@@ -36,7 +36,7 @@ pub(crate) struct Wish {
 }
 
 pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
-    output::check_folder(&wish.out)?;
+    output::check_folder(&wish.out, "--out")?;
     let reading = Reading { arm: wish.arm, seed: wish.seed, columns: wish.columns.columns(), ..Reading::default() };
     let wanted = evaluate::Wish {
         model: &wish.model,

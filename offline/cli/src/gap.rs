@@ -12,9 +12,9 @@ use ::gap::verdicts::{sha256, sha256_of};
 use ::gap::watch;
 use arm::Side;
 use gap_report::Status;
-use recordings::open::{Kind, Opened, kind, open};
+use recordings::open::{Kind, kind};
 use recordings::table::{self, TableSource};
-use recordings::tidy::{self, StateTable};
+use recordings::tidy;
 use recordings::{Arms, Recording, csv};
 use simulator::RobotModel;
 use std::io::IsTerminal;
@@ -53,7 +53,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
             wish.sim.len()
         ));
     }
-    output::check_folder(wish.out)?;
+    output::check_folder(wish.out, "--out")?;
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
     let file = |path: &Path| {
         let mut notes = Vec::new();
@@ -183,9 +183,9 @@ fn read(path: &Path, side: Side, notes: &mut Vec<String>) -> Result<Recording, S
     if kind(path).map_err(|error| error.to_string())? == Kind::Csv {
         return csv::read_with_gaps(path).map_err(|error| error.to_string());
     }
-    let mut source = states_or_table(path, None)?;
-    if source.columns().iter().any(|column| column.name.starts_with("green_")) {
-        source = states_or_table(path, Some(arms_of(side)))?;
+    let mut source = table_of(path, None)?;
+    if tidy::has_both_arms(source.columns()) {
+        source = table_of(path, Some(arms_of(side)))?;
         notes.push(format!("{}: holds both arms; the {} one is looked at", path.display(), side.name()));
     }
     let recording = table::collect(&path.display().to_string(), source.as_mut()).map_err(|error| error.to_string())?;
@@ -199,15 +199,8 @@ fn arms_of(side: Side) -> Arms {
     if side == Side::Green { Arms::Green } else { Arms::Gold }
 }
 
-fn states_or_table(path: &Path, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
-    let opened = open(path).map_err(|error| error.to_string())?;
-    Ok(match opened {
-        Opened::Table(source) => source,
-        Opened::States(source) => {
-            let options = tidy::Options { arms, all_truth: false, orientation: false };
-            Box::new(StateTable::new(source, options).map_err(|error| error.to_string())?)
-        }
-    })
+fn table_of(path: &Path, arms: Option<Arms>) -> Result<Box<dyn TableSource>, String> {
+    tidy::open(path, tidy::Options { arms, ..tidy::Options::default() }).map_err(|error| error.to_string())
 }
 
 /// File name, with its place where two runs have the same.

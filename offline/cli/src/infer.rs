@@ -1,7 +1,6 @@
 //! `ravenpose infer`: the service's own plan on rows of a CSV file. Each row stands for itself, as in any ONNX runtime that is given
 //! the 118 features alone; with `--in-order` a model's memory goes from row to row as in the service.
 
-use crate::convert::same_file;
 use crate::output;
 use ravenpose::correction::{Estimator, Quantity};
 use ravenpose::model::{self, Estimate};
@@ -13,9 +12,7 @@ const INPUTS: usize = 118;
 
 pub(crate) fn run(model_path: &Path, input: &Path, out: &Path, weights: &str, in_order: bool) -> Result<ExitCode, String> {
     let format: Format = weights.parse().map_err(|error| format!("--weights: {error}"))?;
-    if [model_path, input].into_iter().any(|given| same_file(given, out)) {
-        return Err(format!("{}: is both input and output; choose another output", out.display()));
-    }
+    output::check_file(out, &[model_path, input])?;
     let network = model::network(model_path).map_err(|error| error.to_string())?;
     let choice =
         choose(&network, &[], f64::INFINITY, Some(format)).map_err(|error| format!("{}: {error}", model_path.display()))?;

@@ -15,6 +15,7 @@ mod pair;
 mod plot;
 mod progress;
 mod prove;
+mod read;
 mod record;
 mod registration;
 mod search;
@@ -95,6 +96,9 @@ enum Command {
         /// Recording with the true tip (vision's truth.csv); without it the truth is in RUN
         #[arg(long)]
         truth: Option<PathBuf>,
+        /// Of a recording of both arms: the one whose tip is paired
+        #[arg(long, value_parser = ["gold", "green"])]
+        arm: Option<String>,
         /// Table of pairs to write (.csv), or the whole recording with the truth in frame 0 inside, for `train` (.mcap, .bag, .252.csv,
         /// .parquet); the report goes beside it as .report.json
         #[arg(long)]
@@ -196,13 +200,13 @@ enum Command {
         #[arg(long, default_value = "gold", value_parser = ["gold", "green", "both"])]
         arm: String,
         /// What they do
-        #[arg(long, default_value = "mixed", value_parser = ["mixed", "teleoperation", "zigzag"])]
+        #[arg(long, default_value = "mixed", value_parser = ["mixed", "teleoperation", "zigzag"], conflicts_with = "commands")]
         motion: String,
         /// Format of the runs: mcap for a RAVEN-II, csv for others, unless told otherwise
         #[arg(long, value_parser = ["mcap", "bag", "parquet", "csv", "csv.gz", "252.csv", "txt", "rvs"])]
         format: Option<String>,
         /// Longest run; each run homes the robot anew
-        #[arg(long, default_value_t = 5.0)]
+        #[arg(long, default_value_t = 5.0, conflicts_with = "commands")]
         run_minutes: f64,
         /// So many runs follow each other at once, each as warm as the last ended; every run begins cold unless told otherwise
         #[arg(long, conflicts_with = "commands")]
@@ -257,10 +261,11 @@ fn main() -> ExitCode {
         }
         Command::Info { files, json } => info::run(&files, json),
         Command::Plot { run, out } => plot::run(&run, &out),
-        Command::Pair { run, truth, out, cameras, register, same, offset_s, clock_known, mounting_known } => {
+        Command::Pair { run, truth, arm, out, cameras, register, same, offset_s, clock_known, mounting_known } => {
             pair::run(&pair::Wish {
                 run: &run,
                 truth: truth.as_deref(),
+                arm: arm.as_deref(),
                 out: &out,
                 cameras: cameras.as_deref(),
                 register: register.as_deref(),

@@ -10,7 +10,8 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
     let mut aside = path.as_os_str().to_owned();
     aside.push(format!(".{}.new", std::process::id()));
     let aside = PathBuf::from(aside);
-    let failed = |cause: std::io::Error| format!("{}: cannot be written: {cause}", path.display());
+    let failed =
+        |cause: std::io::Error| format!("{}: cannot be written: {cause}; check the folder and its permissions", path.display());
     let file = File::create(&aside).map_err(failed)?;
     let mut buffered = BufWriter::new(file);
     let written = write(&mut buffered)
@@ -23,10 +24,26 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
     written
 }
 
-/// Can a folder be made there, or is it one? Asked before the work whose results it is for.
-pub(crate) fn check_folder(out: &Path) -> Result<(), String> {
+/// Can a file be written there, and is it none of the inputs? Asked before the work whose result it is for.
+pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
+    let same = |input: &&Path| matches!((input.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if inputs.iter().any(same) {
+        return Err(format!("{}: is both input and output; choose another output", out.display()));
+    }
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        return Err(format!("{}: there is no folder {}; make it first", out.display(), folder.display()));
+    }
+    if out.is_dir() {
+        return Err(format!("{}: is a folder; give the name of a file", out.display()));
+    }
+    Ok(())
+}
+
+/// Can a folder be made there, or is it one? Asked before the work whose results it is for; `option` gives it.
+pub(crate) fn check_folder(out: &Path, option: &str) -> Result<(), String> {
     match out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
-        Some(file) => Err(format!("{}: is a file; give a folder with --out", file.display())),
+        Some(file) => Err(format!("{}: is a file; give a folder with {option}", file.display())),
         None => Ok(()),
     }
 }

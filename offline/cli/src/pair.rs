@@ -1,15 +1,14 @@
 //! `ravenpose pair`: reported and true tip positions of the same moments, with the clock and the frame between them; as a table, or as the
 //! recording with its truth inside, which `ravenpose train` learns from.
 
-use crate::convert::same_file;
-use crate::{output, plot, registration};
+use crate::{output, read, registration};
 use arm::Side;
-use recordings::Recording;
 use recordings::open::{Opened, open};
-use recordings::pairs::{Clock, ClockChoice, Options, RegistrationChoice, Reported, TRUTH, Truth, pair, stated_offset_s};
+use recordings::pairs::{Clock, ClockChoice, Options, Paired, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
 use recordings::save::{self, StateFormat};
 use recordings::stream::{self, Record};
-use recordings::tidy;
+use recordings::table::TableSource;
+use recordings::{Arms, Recording, tidy};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
@@ -20,6 +19,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) run: &'a Path,
     /// The true tip, where it is in a file of its own.
     pub(crate) truth: Option<&'a Path>,
+    /// Of a recording of both arms: the one that is paired.
+    pub(crate) arm: Option<&'a str>,
     /// A table of pairs, or a recording with the truth inside.
     pub(crate) out: &'a Path,
     /// cameras.toml whose `[registration]` is the frame.
@@ -49,12 +50,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     if format.is_none() && !is_table {
         return Err(format!("{}: not a format of pairs; name the output .csv, .mcap, .bag or .parquet", out.display()));
     }
-    if [run].into_iter().chain(wish.truth).any(|input| same_file(input, out)) {
-        return Err(format!("{}: is both input and output; choose another output", out.display()));
-    }
+    output::check_file(out, &[run].into_iter().chain(wish.truth).collect::<Vec<_>>())?;
     let known = wish.cameras.map(registration::read).transpose()?;
-    let (recording, mut status) = plot::read_with(run, tidy::Options { orientation: true, ..tidy::Options::default() })?;
-    let separate = match wish.truth.map(plot::read).transpose()? {
+    let (recording, mut status) = read::all_of(run, of_one_arm(run, wish.arm)?)?;
+    let separate = match wish.truth.map(read::read).transpose()? {
         None => None,
         Some((truth, of_truth)) => {
             if of_truth != ExitCode::SUCCESS {
@@ -64,11 +63,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         }
     };
     let reported = Reported::from_recording(&recording).map_err(|error| error.to_string())?;
-    let holds_truth = |recording: &Recording| TRUTH.iter().all(|name| recording.column(name).is_some());
-    if separate.is_none() && !holds_truth(&recording) {
-        return Err(format!("{}: holds no true position ({}); give it with --truth", run.display(), TRUTH.join(", ")));
-    }
-    let frames = Truth::from_recording(separate.as_ref().unwrap_or(&recording)).map_err(|error| error.to_string())?;
+    let frames = match &separate {
+        Some(truth) => Truth::from_recording(truth).map_err(|error| error.to_string())?,
+        None => Truth::of_run(&recording).map_err(|error| format!("{error}; give it with --truth"))?,
+    };
     let mut options = if wish.same { Options::same_clock_and_frame() } else { Options::default() };
     options.mounting_known = wish.mounting_known;
     if let Some(known) = known {
@@ -92,7 +90,9 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         return Err(format!("{}: {what}; leave it out, or give a truth with qw, qx, qy, qz", run.display()));
     }
     if let Some(format) = format {
-        recording_with_truth(wish, &paired, format)?;
+        let is_green = recording.metadata.get("arm").is_some_and(|arm| arm == Side::Green.name());
+        let side = if is_green { Side::Green } else { Side::Gold };
+        recording_with_truth(wish, &paired, side, format)?;
     } else {
         let text = table(&paired, &recording);
         output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
@@ -109,9 +109,26 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
     Ok(status)
 }
 
+/// The run as a table of one arm: the one that is asked for, or that there is.
+fn of_one_arm(run: &Path, arm: Option<&str>) -> Result<Box<dyn TableSource>, String> {
+    let options = tidy::Options { orientation: true, ..tidy::Options::default() };
+    let table = |arms| tidy::open(run, tidy::Options { arms, ..options }).map_err(|error| error.to_string());
+    let source = table(None)?;
+    let is_of_both = tidy::has_both_arms(source.columns());
+    let held = source.metadata().iter().find(|(key, _)| key == "arm").map(|(_, held)| held.as_str());
+    match arm {
+        None if is_of_both => Err(format!("{}: holds both arms; say which one with --arm gold or --arm green", run.display())),
+        Some(arm) if is_of_both => table(Some(if arm == "green" { Arms::Green } else { Arms::Gold })),
+        Some(arm) if held.is_some_and(|held| held != arm) => {
+            Err(format!("{}: is of the {} arm; leave --arm out", run.display(), held.unwrap_or_default()))
+        }
+        _ => Ok(source),
+    }
+}
+
 /// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that
 /// the recording held for that arm is left out.
-fn recording_with_truth(wish: &Wish, paired: &recordings::pairs::Paired, format: StateFormat) -> Result<(), String> {
+fn recording_with_truth(wish: &Wish, paired: &Paired, side: Side, format: StateFormat) -> Result<(), String> {
     let (run, out) = (wish.run, wish.out);
     let Opened::States(mut source) = open(run).map_err(|error| error.to_string())? else {
         let remedy = "name the output .csv for the table of pairs, or convert the run to .mcap first";
@@ -129,13 +146,11 @@ fn recording_with_truth(wish: &Wish, paired: &recordings::pairs::Paired, format:
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
     let mut pairs = paired.pairs.iter().peekable();
     let mut start_ns = None;
-    let mut side = Side::Gold;
     while let Some(record) = source.next().map_err(|error| error.to_string())? {
         let time_ns = record.time_ns();
         match &record {
-            Record::State(state) => {
+            Record::State(_) => {
                 let start_ns = *start_ns.get_or_insert(time_ns);
-                side = if state.connected() == 2 { Side::Green } else { Side::Gold };
                 let at_ns = |time_s: f64| start_ns + (time_s * 1e9).round() as i64;
                 while let Some(pair) = pairs.next_if(|pair| at_ns(pair.state_time_s) < time_ns) {
                     let truth = stream::Truth {
@@ -156,7 +171,7 @@ fn recording_with_truth(wish: &Wish, paired: &recordings::pairs::Paired, format:
 }
 
 /// One row per pair: times on both clocks, reported and true position and the label, mm, frame 0.
-fn table(paired: &recordings::pairs::Paired, recording: &Recording) -> String {
+fn table(paired: &Paired, recording: &Recording) -> String {
     let mut text = format!("# recording = {}\n# label = truth - reported, frame 0 of the arm\n", recording.name.escape_debug());
     text.push_str("t_s,truth_t_s,x_mm,y_mm,z_mm,truth_x_mm,truth_y_mm,truth_z_mm,label_x_mm,label_y_mm,label_z_mm\n");
     for pair in &paired.pairs {

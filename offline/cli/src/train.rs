@@ -1,6 +1,5 @@
 //! `ravenpose train`: from recordings with truth to a model file.
 
-use crate::convert::same_file;
 use crate::output;
 use ::training::commands::{self, Done, Event};
 use ::training::data::{Columns, Reading};
@@ -144,9 +143,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         Some(file) => format!("{}: {wrong}; give the best.json of `ravenpose search`", file.display()),
         None => format!("--preset {}: {wrong}", wish.preset),
     })?;
-    if wish.source.data.iter().any(|input| same_file(input, &wish.out)) {
-        return Err(format!("{}: is both input and output; choose another output", wish.out.display()));
-    }
+    output::check_file(&wish.out, &wish.source.data.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let reading = wish.source.reading(&recipe)?;
     let wanted = commands::Wish { data: &wish.source.data, reading: &reading, recipe: &recipe, out: &wish.out };
     let terminal = std::io::stderr().is_terminal();

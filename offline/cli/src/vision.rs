@@ -1,5 +1,6 @@
 //! `ravenpose vision`: where the cameras stand, and where the end effector is in their images.
 
+use crate::output;
 use crate::progress::Progress;
 use ::vision::commands::{self, Calibrated};
 use ::vision::marking::Marking;
@@ -112,9 +113,11 @@ fn mode(paper: bool) -> Mode {
 }
 
 fn calibrate(rig: &Path, out: &Path, mode: Mode) -> Result<ExitCode, String> {
+    let inputs = ["rig.toml", "markers.csv"].map(|name| rig.join(name));
+    output::check_file(out, &inputs.each_ref().map(PathBuf::as_path))?;
     let found = commands::calibrate(rig, mode).map_err(|error| error.to_string())?;
     commands::write_cameras(&found, out).map_err(|error| error.to_string())?;
-    let _ = crate::output::say(format_args!("{}", calibrated_words(&found)));
+    let _ = output::say(format_args!("{}", calibrated_words(&found)));
     for remark in &found.remarks {
         complain!("ravenpose: {remark}");
     }
@@ -141,12 +144,17 @@ fn calibrated_words(found: &Calibrated) -> String {
 }
 
 fn track(cameras: &Path, scene: &Path, out: &Path, mode: Mode, overlay: Option<&Path>) -> Result<ExitCode, String> {
+    let inputs = ["rig.toml", "frames.csv"].map(|name| scene.join(name));
+    output::check_file(out, &[cameras, &inputs[0], &inputs[1]])?;
+    if let Some(folder) = overlay {
+        output::check_folder(folder, "--overlay")?;
+    }
     let mut progress = Progress::frames();
     let tracked = commands::track(cameras, scene, mode, &mut |done, all| progress.at(done as u64, all as u64));
     progress.end();
     let tracked = tracked.map_err(|error| error.to_string())?;
     commands::write_truth(&tracked, out).map_err(|error| error.to_string())?;
-    let _ = crate::output::say(format_args!("{}", tracked_words(&tracked)));
+    let _ = output::say(format_args!("{}", tracked_words(&tracked)));
     if let Some(folder) = overlay {
         let page = commands::write_overlay(cameras, scene, &tracked, folder).map_err(|error| error.to_string())?;
         say!("{}: the frames, with what was found in them", page.display());
@@ -263,7 +271,7 @@ const TRUE_TURN: [&str; 4] = ["truth_qw", "truth_qx", "truth_qy", "truth_qz"];
 
 fn render(run: &Path, out: &Path, scene: &str, seed: u64, seconds: f64) -> Result<ExitCode, String> {
     let scene = renderer::Scene::named(scene).map_err(|error| error.to_string())?;
-    let (recording, status) = crate::plot::read(run)?;
+    let (recording, status) = crate::read::read(run)?;
     let column = |name: &str| {
         recording.column(name).ok_or_else(|| {
             format!("{}: no column {name}; give a recording of ravenpose simulate, which holds the true pose", run.display())

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Folder, done, errors, ravenpose, refused, text, with_effect};
+use recordings::csv;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Output;
@@ -226,6 +227,56 @@ fn a_cut_recording_gives_what_stands_before_the_cut_and_says_where() {
         assert!(error.lines().count() == 1 && error.contains("cut.mcap: byte "), "{error}");
     }
     assert!(page.exists() && pairs.exists());
+    // And so does a simulation that follows its commands.
+    let again = folder.file("again");
+    let output = ravenpose(&["simulate", "--commands", text(&cut), "--out", text(&again)]);
+    let error = errors(&output);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.lines().count() == 1 && error.contains("cut.mcap: byte "), "{error}");
+    assert!(again.join("run_0001.mcap").exists());
+    let both = ravenpose(&["simulate", "--commands", text(&cut), "--motion", "zigzag", "--out", text(&folder.file("z"))]);
+    assert!(both.status.code() == Some(2) && errors(&both).contains("--motion"), "{}", errors(&both));
+}
+
+#[test]
+fn cells_that_cannot_be_kept_are_told_and_the_status_is_1() {
+    let folder = Folder::new("words");
+    let mut rows: Vec<String> = (0..40).map(|row| format!("{row},{row}.5")).collect();
+    rows[20] = "20,2o.5".to_owned();
+    let table = folder.write("table.csv", format!("t_s,x_mm\n{}\n", rows.join("\n")));
+    let out = folder.file("out.parquet");
+    let output = ravenpose(&["convert", text(&table), text(&out)]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(errors(&output).contains("table.csv: 1 cells are no numbers") && out.exists(), "{}", errors(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("first in line 22: `2o.5`"));
+}
+
+#[test]
+fn of_a_recording_of_both_arms_the_one_that_is_named_is_paired() {
+    let folder = Folder::new("both");
+    let out = folder.file("runs");
+    assert!(simulate(&out, &["--arm", "both"]).status.success());
+    let (run, pairs) = (out.join("run_0001.mcap"), folder.file("pairs.csv"));
+    refused(&ravenpose(&["pair", text(&run), "--same", "--out", text(&pairs)]), &["holds both arms", "--arm green"]);
+    // Its states keep both arms.
+    refused(&ravenpose(&["convert", text(&run), text(&folder.file("one.bag")), "--arm", "gold"]), &["leave --arm out"]);
+    let error_of = |run: &Path, arm: &str| {
+        done(&["pair", text(run), "--same", "--arm", arm, "--out", text(&pairs)]);
+        let table = csv::read(&pairs).expect("pairs");
+        let column = |name: &str| table.column(name).expect("a column")[5];
+        (column("x_m"), column("label_x_mm"))
+    };
+    let (gold, green) = (error_of(&run, "gold"), error_of(&run, "green"));
+    assert!(gold != green, "{gold:?} {green:?}");
+    for (arm, expected) in [("gold", gold), ("green", green)] {
+        let with = folder.file("with.mcap");
+        done(&["pair", text(&run), "--same", "--arm", arm, "--out", text(&with)]);
+        assert_eq!(error_of(&with, arm), expected, "{arm}");
+    }
+    let one = folder.file("one");
+    assert!(simulate(&one, &[]).status.success());
+    let gold = one.join("run_0001.mcap");
+    refused(&ravenpose(&["pair", text(&gold), "--same", "--arm", "green", "--out", text(&pairs)]), &["is of the gold arm"]);
 }
 
 #[test]

@@ -73,7 +73,16 @@ fn a_simulated_recording_is_rendered_measured_and_paired() {
         ["vision", "render", "runs/run_0001.mcap", "--out", "seen", "--scene", "scene.toml", "--seed", "3", "--seconds", "8"];
     let words = done(&own.0, &render);
     assert!(words.contains("frames of 4 cameras"), "{words}");
+    // What cannot be written is told before the work, and no input is replaced.
+    for (out, words) in
+        [("none/cameras.toml", "there is no folder none"), ("seen/rig.toml", "both input and output"), (".", "is a folder")]
+    {
+        refused(&own.0, &["vision", "calibrate", "seen", "--out", out], &[words]);
+    }
     done(&own.0, &["vision", "calibrate", "seen", "--out", "cameras.toml"]);
+    for (out, words) in [("none/truth.csv", "there is no folder none"), ("cameras.toml", "both input and output")] {
+        refused(&own.0, &["vision", "track", "--cameras", "cameras.toml", "seen", "--out", out], &[words]);
+    }
     // As `vision record` writes it: a second before the images are on the clock of the states, which simulated runs begin at 1.7e9 s.
     let frames = own.text("seen/frames.csv");
     std::fs::write(own.0.join("seen/frames.csv"), format!("# start_unix_s = soon\n{frames}")).expect("frames");

@@ -1,21 +1,14 @@
 //! Seconds and memory of each stage of an analysis: `resources REAL [SIM]`, recordings of the built-in arm. For development.
 use gap::analysis::{Given, Options, analyse};
 use gap::needed::keep_needed;
-use recordings::open::{Opened, open};
-use recordings::tidy::{self, StateTable};
+use recordings::tidy;
 use recordings::{Recording, table};
 use simulator::model::RobotModel;
 use std::path::Path;
 use std::time::Instant;
 
 fn read(path: &str, model: &RobotModel) -> Recording {
-    let mut source = match open(Path::new(path)).expect("a recording") {
-        Opened::Table(source) => source,
-        Opened::States(source) => {
-            let options = tidy::Options { arms: None, all_truth: false, orientation: false };
-            Box::new(StateTable::new(source, options).expect("states"))
-        }
-    };
+    let mut source = tidy::open(Path::new(path), tidy::Options::default()).expect("a recording");
     let mut recording = table::collect(path, source.as_mut()).expect("a table");
     keep_needed(&mut recording, model);
     recording

@@ -141,4 +141,8 @@ impl TableSource for CutTable {
     fn findings(&self) -> Vec<String> {
         self.source.findings()
     }
+
+    fn cells_lost(&self) -> u64 {
+        self.source.cells_lost()
+    }
 }

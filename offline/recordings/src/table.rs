@@ -167,6 +167,11 @@ pub trait TableSource {
     fn findings(&self) -> Vec<String> {
         Vec::new()
     }
+
+    /// After the end: cells whose content could not be kept and that are taken as missing; a finding tells which.
+    fn cells_lost(&self) -> u64 {
+        0
+    }
 }
 
 /// A table being written. It stands under its final name only after [`TableSink::finish`].

@@ -79,6 +79,14 @@ fn a_few_cells_that_are_no_numbers_are_told_and_missing() {
         source.findings(),
         ["column `x_mm`: 1 cells are no numbers that can be kept (first in line 22: `2o.5`), taken as missing"]
     );
+    assert_eq!(source.cells_lost(), 1);
+    // A number that no double holds is none; infinity in letters is one.
+    rows[20] = "20,1e999".to_owned();
+    rows[21] = "21,-inf".to_owned();
+    let mut source = table(&format!("t_s,x_mm\n{}\n", rows.join("\n")));
+    let cells = cells(&mut source);
+    assert_eq!((cells[1][20].as_str(), cells[1][21].as_str()), ("NaN", "-inf"));
+    assert_eq!(source.cells_lost(), 1);
 }
 
 #[test]

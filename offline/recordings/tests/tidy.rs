@@ -146,7 +146,7 @@ fn truth_without_a_row_is_counted_and_truth_columns_can_be_asked_for() {
     let run = table::collect("run", &mut table).expect("recording");
     assert_eq!(run.column("truth_x_m").expect("truth").iter().filter(|value| !value.is_nan()).count(), 1);
     assert_eq!(table.findings(), ["2 truth samples had no row of their own within 20 ms and were dropped"]);
-    // Truth that begins late has columns only if they are asked for.
+    // Truth that begins late has columns if they are asked for, or if the whole file is looked at.
     let states = motion(9000, 0);
     let mut records: Vec<Record> = states.iter().map(record).collect();
     records.push(Record::Truth(truth_of(&states[8999], Side::Gold, &mut random)));
@@ -157,6 +157,25 @@ fn truth_without_a_row_is_counted_and_truth_columns_can_be_asked_for() {
     let run = to_recording("run", source(&path), Options { arms: Some(Arms::Gold), all_truth: true, ..Options::default() })
         .expect("recording");
     assert!(!run.column("truth_x_m").expect("truth")[8999].is_nan());
+    let mut table = recordings::tidy::open(&path, Options { arms: Some(Arms::Gold), ..Options::default() }).expect("table");
+    let run = table::collect("run", table.as_mut()).expect("recording");
+    assert!(run.column("truth_x_m").expect("truth").iter().position(|x| !x.is_nan()) == Some(8999));
+    assert!(table.findings().is_empty() && run.column("truth_offset_s").is_none(), "{:?}", table.findings());
+}
+
+#[test]
+fn an_arm_that_is_connected_late_has_its_columns() {
+    let scratch = Scratch::new("tidy-late-arm");
+    let of = |arms| recordings::synthetic::states(5, 9.0, arms).expect("states").states;
+    let (gold, mut both) = (of(Arms::Gold), of(Arms::Both));
+    both[..8500].copy_from_slice(&gold[..8500]);
+    let path = file(&scratch, &both.iter().map(record).collect::<Vec<_>>());
+    let by_the_first = StateTable::new(source(&path), Options::default()).expect("table");
+    assert!(!recordings::tidy::has_both_arms(by_the_first.columns()));
+    let mut table = recordings::tidy::open(&path, Options::default()).expect("table");
+    assert!(recordings::tidy::has_both_arms(table.columns()));
+    let run = table::collect("run", table.as_mut()).expect("recording");
+    assert_eq!((run.rows(), run.column("t_s").expect("time")[0]), (9000, 0.0));
 }
 
 #[test]

@@ -85,13 +85,30 @@ pub fn find(folder: &Path, name: &str) -> Option<PathBuf> {
 /// # Errors
 /// If it cannot be read, is no image, or has another size.
 pub fn read(file: &Path, size_px: [u32; 2]) -> Result<RgbImage> {
+    read_unless_damaged(file, size_px)?.map_err(|damage| no_image(file, damage))
+}
+
+fn no_image(file: &Path, what: String) -> Error {
+    Error::content(file, "image", what, "give a JPEG or PNG")
+}
+
+/// The same, where an image that was cut off is no error: it is what is wrong with it, in one line.
+///
+/// # Errors
+/// If it cannot be read, never was an image, or has another size.
+pub fn read_unless_damaged(file: &Path, size_px: [u32; 2]) -> Result<std::result::Result<RgbImage, String>> {
     let bytes = std::fs::read(file).map_err(Error::read(file))?;
-    let image = image::load_from_memory(&bytes)
-        .map_err(|error| Error::content(file, "image", error.to_string().replace('\n', " "), "give a JPEG or PNG"))?
-        .into_rgb8();
+    let image = match image::load_from_memory(&bytes) {
+        Ok(image) => image.into_rgb8(),
+        Err(error) => {
+            let what = error.to_string().replace('\n', " ");
+            let was_one = bytes.is_empty() || image::guess_format(&bytes).is_ok();
+            return if was_one { Ok(Err(what)) } else { Err(no_image(file, what)) };
+        }
+    };
     if [image.width(), image.height()] != size_px {
         let what = format!("{} x {} px", image.width(), image.height());
         return Err(Error::content(file, "size", what, format!("rig.toml says {} x {}", size_px[0], size_px[1])));
     }
-    Ok(image)
+    Ok(Ok(image))
 }

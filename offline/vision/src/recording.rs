@@ -39,17 +39,21 @@ impl Recording {
         Ok(Self { frames: times, start_unix_s, folder: images, names, size_px: rig.size_px })
     }
 
-    /// Images of a frame by camera; `None` where one is missing or black, with what is to be said about it.
+    /// Images of a frame by camera; `None` where one is missing, damaged or black, with what is to be said about it.
     ///
     /// # Errors
-    /// If an image cannot be read or has another size.
+    /// If an image cannot be read, never was one, or has another size.
     pub fn images(&self, frame: &FrameTime) -> Result<Vec<(Option<RgbImage>, Option<String>)>> {
         let read = |name: &String| -> Result<(Option<RgbImage>, Option<String>)> {
             let number = format!("{:06}", frame.frame);
             let Some(file) = picture::find(&self.folder.join(name), &number) else {
                 return Ok((None, Some(format!("{}: no image of frame {}", self.folder.join(name).display(), frame.frame))));
             };
-            let image = picture::read(&file, self.size_px)?;
+            // A camera that fell out while it wrote must not cost the other frames.
+            let image = match picture::read_unless_damaged(&file, self.size_px)? {
+                Ok(image) => image,
+                Err(damage) => return Ok((None, Some(format!("{}: {damage}", file.display())))),
+            };
             if image.as_raw().iter().step_by(97).all(|value| *value < BLACK) {
                 return Ok((None, Some(format!("{}: black", file.display()))));
             }

@@ -109,6 +109,23 @@ fn a_file_that_is_no_image_is_named() {
 }
 
 #[test]
+fn an_image_that_was_cut_off_costs_its_camera_that_frame_alone() {
+    let Some(own) = scene("cut", 3) else { return };
+    let path = own.0.join("frames/cam2/000001.jpg");
+    let whole = std::fs::read(&path).expect("image");
+    for kept in [0, 20] {
+        std::fs::remove_file(&path).expect("image");
+        std::fs::write(&path, &whole[..kept]).expect("file");
+        let tracked = run(&own.0, Mode::Default).expect("tracked");
+        assert!(tracked.rows.iter().all(|row| row.found.is_ok()), "{kept} bytes");
+        let remarks: Vec<&String> = tracked.rows.iter().flat_map(|row| &row.remarks).collect();
+        assert!(remarks.len() == 1 && remarks[0].contains("cam2/000001.jpg: "), "{remarks:?}");
+        let cameras = |row: usize| tracked.rows[row].found.as_ref().expect("a pose").cameras;
+        assert!(cameras(1) < cameras(0), "{:?} {:?}", cameras(1), cameras(0));
+    }
+}
+
+#[test]
 fn frames_out_of_order_name_the_line() {
     let Some(own) = scene("order", 3) else { return };
     own.edit("frames.csv", |text| text.replace("1,0.066667\n2,0.133333", "2,0.133333\n1,0.066667"));

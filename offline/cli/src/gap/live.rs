@@ -265,7 +265,7 @@ fn as_table(minute: VecDeque<RavenState>, model: &RobotModel, notes: &mut Vec<St
             .map_err(|error| error.to_string())
     };
     let first: VecDeque<RavenState> = minute.iter().take(1).copied().collect();
-    let both = table(first, None)?.columns().iter().any(|column| column.name.starts_with("green_"));
+    let both = tidy::has_both_arms(table(first, None)?.columns());
     let arms = both.then(|| arms_of(model.side()));
     notes.extend(arms.map(|_| format!("stream: holds both arms; the {} one is looked at", model.side().name())));
     table::collect("stream", &mut table(minute, arms)?).map_err(|error| error.to_string())

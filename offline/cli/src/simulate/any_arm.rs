@@ -72,7 +72,8 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         );
     }
     let made = format!("{} runs of {:.3} s", runs.len(), runs[0].duration_s);
-    finish(wish, model, &made, &summary, &text)
+    finish(wish, model, &made, &summary, &text)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// One run; returns what its homing left.
@@ -97,7 +98,7 @@ fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) 
 
 /// Commands of recordings, at their times.
 fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, String> {
-    let runs = commands::all(wish.commands, model, wish.arm)?;
+    let (runs, status) = commands::all(wish.commands, model, wish.arm)?;
     let (files, summary) = files(wish, runs.len(), format)?;
     // Each recording homes the robot anew.
     let seed = |index: usize| wish.homing_seed.unwrap_or(wish.seed.unwrap_or_default().wrapping_add(index as u64));
@@ -109,7 +110,8 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
     for (run, file) in runs.iter().zip(&files) {
         let _ = writeln!(text, "{}: commands of {}", name(file), run.name);
     }
-    finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)
+    finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)?;
+    Ok(status)
 }
 
 fn follow(model: &RobotModel, run: &resimulate::Run, file: &Path, seed: u64, watch: &Watch) -> Result<(), String> {

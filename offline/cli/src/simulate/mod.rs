@@ -59,7 +59,6 @@ fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, Pa
     Ok((files, summary))
 }
 
-/// Writes the summary and says in one line what was made.
 /// What is wrong with a run whose numbers grew without bound.
 fn runs_away(robot: &str) -> String {
     format!(
@@ -67,11 +66,12 @@ fn runs_away(robot: &str) -> String {
     )
 }
 
-fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<ExitCode, String> {
+/// Writes the summary and says in one line what was made.
+fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<(), String> {
     crate::output::whole(summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
     let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
     say!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn name(file: &Path) -> String {

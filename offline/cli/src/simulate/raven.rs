@@ -78,7 +78,8 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         text.push('\n');
     }
     let made = format!("{} runs of {:.3} s", runs.len(), runs[0].duration_s);
-    finish(wish, model, &made, &summary, &text)
+    finish(wish, model, &made, &summary, &text)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn motion_of(run: Run) -> &'static str {
@@ -87,7 +88,7 @@ fn motion_of(run: Run) -> &'static str {
 
 /// Commands of recordings, from their first to their last row, at 1 kHz.
 fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, String> {
-    let recorded = commands::all(wish.commands, model, wish.arm)?;
+    let (recorded, status) = commands::all(wish.commands, model, wish.arm)?;
     let (files, summary) = files(wish, recorded.len(), format)?;
     let runs: Vec<Run> = recorded
         .iter()
@@ -116,7 +117,8 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
     for ((run, file), recorded) in runs.iter().zip(&files).zip(&recorded) {
         let _ = writeln!(text, "{}: {:.3} s, commands of {}", name(file), run.duration_s, recorded.name);
     }
-    finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)
+    finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)?;
+    Ok(status)
 }
 
 fn write(player: &mut Player, robot: &str, more: &[(&str, &str)], file: &Path, watch: &Watch) -> Result<(), String> {

@@ -15,7 +15,7 @@ const WORDS_ONE_IN: u64 = 10;
 const EXACT_MAX: f64 = 9_007_199_254_740_992.0;
 
 /// A number that a double holds as it is written, none for anything else. A long whole number (nanoseconds since 1970) that
-/// would be changed is no number here.
+/// would be changed is no number here, nor is one too large for a double (`1e999`); `inf` in letters is.
 fn exact(cell: &str) -> Option<f64> {
     text::number(cell.as_bytes()).and_then(|value| unchanged(cell, value))
 }
@@ -28,7 +28,7 @@ fn unchanged(cell: &str, value: f64) -> Option<f64> {
         let same = cell.parse::<i128>().is_ok_and(|whole| whole as f64 == value && value as i128 == whole);
         return same.then_some(value);
     }
-    Some(value)
+    (value.is_finite() || !cell.bytes().any(|byte| byte.is_ascii_digit())).then_some(value)
 }
 
 /// Reads on as far as the probe goes; true for each column of words.
@@ -99,6 +99,11 @@ impl Kinds {
             bad.get_or_insert_with(|| BadCells { count: 0, line, text: text() }).count += 1;
         }
         f64::NAN
+    }
+
+    /// How many cells were no numbers.
+    pub(super) fn lost(&self) -> u64 {
+        self.bad.iter().flatten().map(|bad| bad.count).sum()
     }
 
     /// One sentence for each column with such cells.

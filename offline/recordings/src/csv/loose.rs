@@ -162,6 +162,10 @@ impl TableSource for Table {
         }
         findings
     }
+
+    fn cells_lost(&self) -> u64 {
+        self.kinds.lost()
+    }
 }
 
 /// Pairs of metadata that are kept: more is no metadata.

@@ -32,18 +32,24 @@ pub struct Truth {
 
 const REPORTED: [&str; 3] = ["x_m", "y_m", "z_m"];
 /// Columns of the true tip in a run's own table.
-pub const TRUTH: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
+const TRUTH: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
 const QUATERNION: [&str; 4] = ["qw", "qx", "qy", "qz"];
 const NEEDS: &str = "time (t_s) and the tip's position on both sides (x_mm, y_mm, z_mm and truth_x_mm, truth_y_mm, truth_z_mm)";
 
-fn column<'a>(recording: &'a Recording, name: &'static str) -> Result<&'a [f64], PairError> {
-    recording.column(name).ok_or_else(|| PairError::MissingColumn { recording: recording.name.clone(), column: name, needs: NEEDS })
+const NEEDS_TRUTH: &str = "a true position beside the reported one";
+
+fn column<'a>(recording: &'a Recording, name: &'static str, needs: &'static str) -> Result<&'a [f64], PairError> {
+    recording.column(name).ok_or_else(|| PairError::MissingColumn { recording: recording.name.clone(), column: name, needs })
 }
 
-fn columns<'a, const N: usize>(recording: &'a Recording, names: [&'static str; N]) -> Result<[&'a [f64]; N], PairError> {
+fn columns<'a, const N: usize>(
+    recording: &'a Recording,
+    names: [&'static str; N],
+    needs: &'static str,
+) -> Result<[&'a [f64]; N], PairError> {
     let mut found: [&[f64]; N] = [&[]; N];
     for (place, name) in found.iter_mut().zip(names) {
-        *place = column(recording, name)?;
+        *place = column(recording, name, needs)?;
     }
     Ok(found)
 }
@@ -55,9 +61,9 @@ impl<'a> Reported<'a> {
     /// [`PairError::MissingColumn`].
     pub fn from_recording(recording: &'a Recording) -> Result<Self, PairError> {
         Ok(Self {
-            t_s: column(recording, "t_s")?,
-            position_m: columns(recording, REPORTED)?,
-            quaternion: columns(recording, QUATERNION).ok(),
+            t_s: column(recording, "t_s", NEEDS)?,
+            position_m: columns(recording, REPORTED, NEEDS)?,
+            quaternion: columns(recording, QUATERNION, NEEDS).ok(),
             runlevel: recording.column("runlevel"),
         })
     }
@@ -77,24 +83,39 @@ impl<'a> Reported<'a> {
 }
 
 impl Truth {
-    /// From a recording. With `truth_x_m`, `truth_y_m`, `truth_z_m` in it (a tidy CSV of a run), its rows with a true position
+    /// The true tip inside a run, `truth_x_m`, `truth_y_m`, `truth_z_m`: its rows with a true position. What the arm itself reported
+    /// is none.
+    ///
+    /// # Errors
+    /// [`PairError::MissingColumn`].
+    pub fn of_run(recording: &Recording) -> Result<Self, PairError> {
+        let (t_s, axes) = (column(recording, "t_s", NEEDS)?, columns(recording, TRUTH, NEEDS_TRUTH)?);
+        let at = |row: usize| axes.map(|axis| axis[row]);
+        let rows: Vec<usize> = (0..t_s.len()).filter(|row| at(*row).iter().any(|value| value.is_finite())).collect();
+        Ok(Self {
+            t_s: rows.iter().map(|&row| t_s[row]).collect(),
+            position_m: rows.iter().map(|&row| at(row)).collect(),
+            quaternion: None,
+        })
+    }
+
+    /// From a file of truth. With `truth_x_m`, `truth_y_m`, `truth_z_m` in it (a tidy CSV of a run), its rows with a true position
     /// are the frames; lost ones are then not to be told from rows without a frame. Otherwise (`truth.csv` of the vision)
     /// `x_m`, `y_m`, `z_m` are the true position and every row is a frame.
     ///
     /// # Errors
     /// [`PairError::MissingColumn`].
     pub fn from_recording(recording: &Recording) -> Result<Self, PairError> {
-        let t_s = column(recording, "t_s")?;
-        let embedded = TRUTH.iter().any(|name| recording.column(name).is_some());
-        let axes = columns(recording, if embedded { TRUTH } else { REPORTED })?;
-        let turned: Option<[&[f64]; 4]> = if embedded { None } else { columns(recording, QUATERNION).ok() };
-        let at = |row: usize| axes.map(|axis| axis[row]);
-        let is_frame = |row: &usize| !embedded || at(*row).iter().any(|value| value.is_finite());
-        let rows: Vec<usize> = (0..t_s.len()).filter(is_frame).collect();
+        if TRUTH.iter().any(|name| recording.column(name).is_some()) {
+            return Self::of_run(recording);
+        }
+        let (t_s, axes) = (column(recording, "t_s", NEEDS)?, columns(recording, REPORTED, NEEDS)?);
+        let turned: Option<[&[f64]; 4]> = columns(recording, QUATERNION, NEEDS).ok();
+        let rows = 0..t_s.len();
         Ok(Self {
-            t_s: rows.iter().map(|&row| t_s[row]).collect(),
-            position_m: rows.iter().map(|&row| at(row)).collect(),
-            quaternion: turned.map(|columns| rows.iter().map(|&row| columns.map(|column| column[row])).collect()),
+            t_s: t_s.to_vec(),
+            position_m: rows.clone().map(|row| axes.map(|axis| axis[row])).collect(),
+            quaternion: turned.map(|columns| rows.map(|row| columns.map(|column| column[row])).collect()),
         })
     }
 

@@ -25,7 +25,7 @@ mod track;
 
 pub use drop::Reason;
 pub use error::PairError;
-pub use input::{Reported, TRUTH, Truth};
+pub use input::{Reported, Truth};
 pub use options::{ClockChoice, Limits, Options, OutlierLimits, RegistrationChoice, stated_offset_s};
 pub use report::{ClockReport, Dropped, LabelReport, Motion, OrientationReport, RegistrationReport, Report};
 pub use rigid::Rigid;

@@ -9,11 +9,19 @@
 
 mod align;
 mod columns;
+mod shown;
 mod state_table;
 
+pub use shown::Shown;
 pub use state_table::StateTable;
 
+use std::path::Path;
+
+use arm::Side;
+
+use crate::open::{self, Opened};
 use crate::stream::{Source, StreamError};
+use crate::table::{TableColumn, TableSource};
 use crate::{Arms, Recording, table};
 
 /// What a state or truth loses in a tidy table.
@@ -30,10 +38,34 @@ pub const LOSSES: [&str; 5] = [
 pub struct Options {
     /// The arms; none: those that are connected.
     pub arms: Option<Arms>,
-    /// Columns for every kind of truth, also where the first 8192 records hold none.
+    /// Columns for every kind of truth, also where there is none.
     pub all_truth: bool,
     /// Columns of the reported orientation as a unit quaternion, `qw` to `qz`: end-effector axes into frame 0.
     pub orientation: bool,
+}
+
+/// A file as a table, whatever its format: a table as it is, states with columns for all that their whole file holds. Files of states
+/// are read twice.
+///
+/// # Errors
+/// As [`open::open`].
+pub fn open(path: &Path, options: Options) -> Result<Box<dyn TableSource>, StreamError> {
+    let mut source = match open::open(path)? {
+        Opened::Table(table) => return Ok(table),
+        Opened::States(source) => source,
+    };
+    let shown = Shown::in_all_of(source.as_mut())?;
+    match open::open(path)? {
+        Opened::Table(table) => Ok(table),
+        Opened::States(source) => Ok(Box::new(StateTable::showing(source, &shown, options)?)),
+    }
+}
+
+/// Does a table of states show both arms, each under its own name?
+pub fn has_both_arms(columns: &[TableColumn]) -> bool {
+    Side::ALL
+        .iter()
+        .all(|side| columns.iter().any(|column| column.name.strip_prefix(side.name()).is_some_and(|rest| rest.starts_with('_'))))
 }
 
 /// All states in memory as a recording in SI.

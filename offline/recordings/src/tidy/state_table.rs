@@ -1,17 +1,17 @@
 //! A stream of states as a table.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::VecDeque;
 
 use arm::Side;
 
 use super::Options;
 use super::align::{Align, Row};
-use super::columns::{ArmColumns, TruthShown};
-use crate::fields;
+use super::columns::ArmColumns;
+use super::shown::Shown;
 use crate::stream::{Damage, Record, Source, StreamError};
 use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
 
-/// Records that are looked at to decide which columns there are.
+/// Records that are looked at to decide which columns there are, where the rest is not known yet.
 const PEEK: usize = 8192;
 
 /// States as they stream by, row by row.
@@ -29,7 +29,8 @@ pub struct StateTable {
 }
 
 impl StateTable {
-    /// Looks at the first 8192 records and decides on the columns: the connected arms, and the truth that is known.
+    /// Looks at the first 8192 records and decides on the columns: the connected arms, and the truth that is known. For what comes
+    /// once only; a file may be looked at from end to end first ([`super::open`]).
     ///
     /// # Errors
     /// [`StreamError`] of the source.
@@ -41,9 +42,32 @@ impl StateTable {
                 None => break,
             }
         }
-        let sides = options.arms.map_or_else(|| connected(&peeked), |arms| arms.sides().to_vec());
-        let shown = |side: &Side| if options.all_truth { TruthShown::ALL } else { truth_shown(&peeked, *side) };
-        let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, shown(side), options.orientation)).collect();
+        let mut shown = Shown::default();
+        for record in &peeked {
+            shown.include(record.clone());
+        }
+        Ok(Self::begun(source, peeked, &shown.ended(), options))
+    }
+
+    /// With columns for what the source is known to hold.
+    ///
+    /// # Errors
+    /// [`StreamError`] of the source.
+    pub fn showing(mut source: Box<dyn Source>, shown: &Shown, options: Options) -> Result<Self, StreamError> {
+        let mut peeked = VecDeque::new();
+        while !matches!(peeked.back(), Some(Record::State(_))) && peeked.len() < PEEK {
+            match source.next()? {
+                Some(record) => peeked.push_back(record),
+                None => break,
+            }
+        }
+        Ok(Self::begun(source, peeked, shown, options))
+    }
+
+    fn begun(source: Box<dyn Source>, peeked: VecDeque<Record>, shown: &Shown, options: Options) -> Self {
+        let sides = options.arms.map_or_else(|| shown.arms(), |arms| arms.sides().to_vec());
+        let of = |side: &Side| shown.truth(*side, options.all_truth);
+        let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, of(side), options.orientation)).collect();
         let start_ns = peeked.iter().find(|record| matches!(record, Record::State(_))).map(Record::time_ns);
         let mut columns = vec![TableColumn::number("t_s")];
         for arm in &arms {
@@ -53,7 +77,7 @@ impl StateTable {
         columns.push(TableColumn::number("runlevel"));
         let metadata = metadata(source.as_ref(), &sides, start_ns);
         let row = Vec::with_capacity(columns.len());
-        Ok(Self { source, peeked, align: Align::default(), arms, columns, metadata, start_ns, ended: false, uncovered: 0, row })
+        Self { source, peeked, align: Align::default(), arms, columns, metadata, start_ns, ended: false, uncovered: 0, row }
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, StreamError> {
@@ -136,42 +160,6 @@ impl TableSource for StateTable {
         }
         findings
     }
-}
-
-/// Arms that any of the records shows; gold where none does.
-fn connected(records: &VecDeque<Record>) -> Vec<Side> {
-    let mut arms = 0;
-    for record in records {
-        match record {
-            Record::State(state) => {
-                arms |= match state.connected() {
-                    0 => fields::arms_by_content(state),
-                    connected => connected,
-                }
-            }
-            Record::Truth(truth) => arms |= 1 << truth.side.index(),
-        }
-    }
-    match arms & 3 {
-        2 => vec![Side::Green],
-        3 => Side::ALL.to_vec(),
-        _ => vec![Side::Gold],
-    }
-}
-
-/// What the truth of an arm knows in these records, and whether it comes at other times than the states.
-fn truth_shown(records: &VecDeque<Record>, side: Side) -> TruthShown {
-    let times: HashSet<i64> = records.iter().filter(|record| matches!(record, Record::State(_))).map(Record::time_ns).collect();
-    let mut shown = TruthShown::default();
-    for record in records {
-        if let Record::Truth(truth) = record
-            && truth.side == side
-        {
-            shown.include(truth);
-            shown.offset |= !times.contains(&truth.time_ns);
-        }
-    }
-    shown
 }
 
 /// Metadata of the table: each key once, as readers of tidy CSV want it.
