@@ -3,7 +3,7 @@
 use crate::correction::{Pace, Quantity};
 use crate::cycle::Limits;
 use crate::network::Format;
-use ravenpose_transport::Settings;
+use ravenpose_transport::{Listener, Settings};
 use ravenpose_wire::ARMS;
 use std::io::Read;
 use std::ops::RangeInclusive;
@@ -158,7 +158,9 @@ impl Config {
         let mut file = source.document()?;
         let allow_untrained = file.boolean("allow_untrained", false)?;
         let allow_degraded = file.boolean("allow_degraded", false)?;
-        let transport = transport(file.table("transport")?)?;
+        let table = file.table("transport")?;
+        let root_at = table.place("root").unwrap_or(0);
+        let transport = transport(table)?;
         let mut looping = file.table("loop")?;
         let limits = limits(file.table("limits")?)?;
         let [gold, green] = ARM_NAMES;
@@ -184,6 +186,9 @@ impl Config {
         looping.finish()?;
         report.finish()?;
         file.finish()?;
+        if config.wait == Wait::Event {
+            Listener::check(&config.transport).map_err(|error| source.error(root_at, error.to_string()))?;
+        }
         Ok(config)
     }
 }
@@ -221,6 +226,7 @@ fn limits(mut table: Table) -> Result<Limits, ConfigError> {
 }
 
 fn transport(mut table: Table) -> Result<Settings, ConfigError> {
+    let root_at = table.place("root");
     let mut settings = Settings::default();
     let good = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     let prefix = |text: &str| (1..=32).contains(&text.len()) && text.chars().all(good);
@@ -231,6 +237,7 @@ fn transport(mut table: Table) -> Result<Settings, ConfigError> {
     if let Some(root) = table.text("root", "an absolute path of at most 100 bytes", root)? {
         settings.root = if root.ends_with('/') { root } else { root + "/" };
     }
+    settings.check().map_err(|error| table.source.error(root_at.unwrap_or(0), error.to_string()))?;
     table.finish()?;
     Ok(settings)
 }

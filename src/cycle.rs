@@ -7,10 +7,10 @@
 use crate::correction::{ArmModel, Corrector, Estimator, Judgement, Pace, Quantity};
 use crate::frozen::{DEGRADED_AFTER, FROZEN_AFTER, FrozenWatch};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag};
+use ravenpose_wire::{
+    AHEAD_MAX_NS, ARMS, ArmPose, ArmStatus, CorrectedPose, FALLBACK_REASONS, FEATURES, RavenState, features, flag,
+};
 
-/// A source time this far ahead of our clock is not a time of this machine's `CLOCK_MONOTONIC`.
-const FUTURE_NS: i64 = 1_000_000;
 /// Models: of the position and of the orientation of each arm.
 const PLACES: usize = 2 * ARMS;
 /// Of so many pieces of a model that are kept warm one is the features and the guard, the others are of its weights.
@@ -202,7 +202,7 @@ impl<E: Estimator> Cycle<E> {
         // Copied first, judged afterwards: whoever still writes to the shared message cannot change what was judged.
         let state = *state;
         // `CLOCK_MONOTONIC` is never negative; refusing what is keeps every later difference of times in range.
-        if state.admit().is_err() || !(0..=now_ns.saturating_add(FUTURE_NS)).contains(&state.source_time_ns) {
+        if state.admit().is_err() || !(0..=now_ns.saturating_add(AHEAD_MAX_NS)).contains(&state.source_time_ns) {
             count(&mut self.counters.refused);
             return;
         }

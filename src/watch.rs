@@ -28,6 +28,8 @@ const SECOND: Duration = Duration::from_secs(1);
 /// What the loop says while it has no link; more than a few lines a second nobody reads.
 const TROUBLES: usize = 4;
 const REMOVED: &str = "the shared files were removed under the service (RemoveIPC, a tmp cleaner?)";
+/// So often, after twice as long each time, a new link is tried while a publisher is there and silent: the last time after some eight minutes.
+const SILENCE_TRIES: u32 = 9;
 /// For this long after the link was opened anew it is opened again if newcomers still do not find it.
 const REOPEN_AGAIN: Duration = Duration::from_secs(20);
 /// How long the last files may take.
@@ -72,7 +74,8 @@ pub struct Watch {
     /// When the link was first opened anew after it had worked.
     reopened: Option<Instant>,
     silent_since: Option<Instant>,
-    silence_explained: bool,
+    /// How often a new link was tried in this silence.
+    silence_tries: u32,
 }
 
 impl Watch {
@@ -120,7 +123,7 @@ impl Watch {
             unreachable: 0,
             reopened: None,
             silent_since: None,
-            silence_explained: false,
+            silence_tries: 0,
         })
     }
 
@@ -228,13 +231,21 @@ impl Watch {
         let never = accepted == 0;
         if publishers == 0 || refuses || !(stale || never) {
             self.silent_since = None;
-            self.silence_explained = false;
-        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed() > 2 * SECOND && !self.silence_explained {
-            self.silence_explained = true;
-            self.writer.line(format!(
-                "a publisher of {} is connected but its states do not arrive; it is stopped, or runs as another user: all parties must run as the same user",
-                RavenState::SERVICE
-            ));
+            self.silence_tries = 0;
+        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed()
+            > 2 * SECOND * (1 << self.silence_tries.min(SILENCE_TRIES))
+        {
+            if self.silence_tries == 0 {
+                self.writer.line(format!(
+                    "a publisher of {} is connected but its states do not arrive; it is stopped, or could not connect this reader, or runs as another user: all parties must run as the same user",
+                    RavenState::SERVICE
+                ));
+            }
+            // A controller that could not connect us (no descriptor free) tries again when a reader comes, and not before.
+            if self.silence_tries < SILENCE_TRIES {
+                self.silence_tries += 1;
+                self.shared.reopen.store(true, Relaxed);
+            }
         }
     }
 

@@ -83,7 +83,7 @@ const WRONG_TYPE: [(&str, &str); 21] = [
     ("[report]\ninterval_s = 1e3", ":2:14: report.interval_s = 1e3 must be a whole number from 1 to 86400"),
 ];
 
-const WRONG_VALUE: [(&str, &str); 27] = [
+const WRONG_VALUE: [(&str, &str); 29] = [
     ("[limits]\nstale_us = 1000", ":2:12: limits.stale_us = 1000 must be longer than limits.period_us = 1000"),
     ("[limits]\nperiod_us = 800\nstale_us = 500", ":3:12: limits.stale_us = 500 must be longer than limits.period_us = 800"),
     ("[limits]\nperiod_us = 8_000", ":2:13: limits.stale_us = 5000 (the default) must be longer than limits.period_us = 8000"),
@@ -113,6 +113,11 @@ const WRONG_VALUE: [(&str, &str); 27] = [
     (
         "[transport]\nroot = \"/a\\u0000\"",
         ":2:8: transport.root = \"/a\\u0000\" must be an absolute path of at most 100 bytes, in quotes",
+    ),
+    ("[transport]\nroot = \"/ä\"", ":2:8: transport root \"/ä/\" is not usable as a file name; use letters, digits, '_' and '-'"),
+    (
+        "[transport]\nprefix = \"robot_\"\nroot = \"/rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr\"\n[loop]\nwait = \"event\"",
+        ":3:8: transport prefix \"robot_\" and root \"/rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr/\" together have more than the 72 bytes that wait = \"event\" leaves them; give a shorter root",
     ),
     ("[gold]", ":1:1: gold.model is missing; add model = \"FILE.onnx\" to [gold]"),
     (

@@ -3,8 +3,8 @@
  * Generated from bridge/src/lib.rs and wire/src by bridge/tests/header.rs: do not edit.
  *
  * Consumer rule: use corrected position and orientation only if the layout version matches, the sequence has advanced, the age is below
- * RAVENPOSE_POSE_AGE_MAX_NS and the status is RAVENPOSE_STATUS_VALID; otherwise use the raw ones. ravenpose_position() and
- * ravenpose_orientation() do this.
+ * RAVENPOSE_POSE_AGE_MAX_NS and no less than -1 ms (that is another clock), and the status is RAVENPOSE_STATUS_VALID; otherwise use
+ * the raw ones. ravenpose_position() and ravenpose_orientation() do this.
  *
  * Pointers may be null (an error code); otherwise they must be valid. A handle may be used by any thread, one at a time.
  */

@@ -18,13 +18,11 @@ pub use handle::{PoseReader, Publisher};
 
 use handle::guarded;
 use ravenpose_transport::Settings;
-use ravenpose_wire::{ARMS, ArmPose, ArmStatus, CorrectedPose, RavenState};
+use ravenpose_wire::{AHEAD_MAX_NS, ARMS, ArmPose, ArmStatus, CorrectedPose, RavenState};
 use std::ffi::{CStr, c_char};
 
 /// Version of this interface. `ravenpose_*_open` refuses a caller that was compiled against another one.
 pub const RAVENPOSE_ABI_VERSION: u32 = 1;
-/// How far a pose may be ahead of the caller's clock, ns.
-const FUTURE_NS: i64 = 1_000_000;
 /// Age beyond which a pose must not be used, ns (the consumer rule).
 pub const RAVENPOSE_POSE_AGE_MAX_NS: i64 = 5_000_000;
 
@@ -325,7 +323,7 @@ unsafe fn consume<T: Copy, const N: usize>(
         return Code::Absent as i32;
     }
     // A pose of the future is of another clock, and may be of any age.
-    let fresh = (-FUTURE_NS..RAVENPOSE_POSE_AGE_MAX_NS).contains(&now_ns.saturating_sub(pose.source_time_ns));
+    let fresh = (-AHEAD_MAX_NS..RAVENPOSE_POSE_AGE_MAX_NS).contains(&now_ns.saturating_sub(pose.source_time_ns));
     let (is_corrected, corrected, raw) = of(estimate);
     let usable = fresh && estimate.status == ArmStatus::Valid as u32 && is_corrected;
     let numbers = if usable { corrected } else { raw };

@@ -4,12 +4,12 @@
 
 use super::limits::user_id;
 use super::{Finding, Tree};
+use ravenpose_transport::ROOM;
+use std::fmt::Write as _;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// Free shared memory below which a start is a gamble: measured use of all segments is about 10 MiB.
-const SHARED_FREE_MIN: u64 = 64 << 20;
 /// iceoryx2's own directory, and the directory and prefix of its shared memory.
 const TRANSPORT_ROOT: &str = "/tmp/iceoryx2";
 const SHARED: &str = "/dev/shm";
@@ -70,21 +70,31 @@ pub(super) fn compaction(tree: &Tree) -> Finding {
 /// Is there room for the segments?
 pub(super) fn shared_memory(tree: &Tree) -> Finding {
     match space(&tree.path(SHARED)) {
-        Ok((total, free)) => judge_shared_memory(total, free),
+        Ok((total, free)) => judge_shared_memory(total, free, taken(&tree.path(SHARED))),
         Err(cause) => {
             Finding::unknown("memory.shared", format!("{SHARED} cannot be examined ({cause})"), "mount -t tmpfs tmpfs /dev/shm")
         }
     }
 }
 
-pub(super) fn judge_shared_memory(total: u64, free: u64) -> Finding {
+/// Bytes that the transport has there already: a service that runs needs them no second time.
+fn taken(shared: &Path) -> u64 {
+    let files = std::fs::read_dir(shared).into_iter().flatten().flatten();
+    let ours = files.filter(|file| file.file_name().as_bytes().starts_with(PREFIX.as_bytes()));
+    ours.filter_map(|file| file.metadata().ok()).map(|file| 512 * file.blocks()).sum()
+}
+
+pub(super) fn judge_shared_memory(total: u64, free: u64, taken: u64) -> Finding {
     let id = "memory.shared";
-    let found = format!("{SHARED}: {} of {} MiB free", free >> 20, total >> 20);
-    if free >= SHARED_FREE_MIN {
+    let mut found = format!("{SHARED}: {} of {} MiB free", free >> 20, total >> 20);
+    if taken > 0 {
+        let _ = write!(found, ", {} MiB taken by the transport", taken >> 20);
+    }
+    if free + taken >= ROOM {
         return Finding::ok(id, found);
     }
     let remedy = "remove what is not needed from /dev/shm, or: mount -o remount,size=1G /dev/shm (and the same size in /etc/fstab)";
-    Finding::fail(id, format!("{found}, {} MiB are needed", SHARED_FREE_MIN >> 20), remedy)
+    Finding::fail(id, format!("{found}, {} MiB are needed", ROOM.div_ceil(1 << 20)), remedy)
 }
 
 /// Total and free bytes of a file system.

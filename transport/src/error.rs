@@ -1,5 +1,8 @@
 //! What can go wrong when a link is opened or used.
 
+use crate::Settings;
+use ravenpose_wire::ICEORYX2_VERSION;
+use std::fmt::Debug;
 use thiserror::Error;
 
 /// Each message is one line that says what happened and what to do.
@@ -12,6 +15,18 @@ pub enum TransportError {
         what: String,
         /// As given.
         value: String,
+    },
+    /// Names too long for the socket that a service with `wait = "event"` listens at.
+    #[error(
+        "transport prefix {prefix:?} and root {root:?} together have more than the {most} bytes that wait = \"event\" leaves them; give a shorter root"
+    )]
+    TooLong {
+        /// Prefix of the files.
+        prefix: String,
+        /// Root directory.
+        root: String,
+        /// Bytes that both may have together.
+        most: usize,
     },
     /// iceoryx2 could not make this process known.
     #[error(
@@ -91,4 +106,10 @@ pub enum TransportError {
         /// Service name.
         service: &'static str,
     },
+}
+
+impl TransportError {
+    pub(crate) fn service(service: &'static str, settings: &Settings, cause: &impl Debug) -> Self {
+        Self::Service { service, cause: format!("{cause:?}"), version: ICEORYX2_VERSION, prefix: settings.prefix.clone() }
+    }
 }

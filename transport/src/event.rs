@@ -3,24 +3,20 @@
 
 use crate::{Settings, TransportError};
 use iceoryx2::node::Node;
+use iceoryx2::port::listener::ListenerCreateError;
+use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::prelude::{ServiceName, ipc};
 use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
-use ravenpose_wire::{ICEORYX2_VERSION, STATE_SERVICE};
+use ravenpose_wire::STATE_SERVICE;
 use std::time::Duration;
 
 type EventFactory = iceoryx2::service::port_factory::event::PortFactory<ipc::Service>;
 
 fn open(settings: &Settings) -> Result<(EventFactory, Node<ipc::Service>), TransportError> {
-    let unusable = |cause: String| TransportError::Service {
-        service: STATE_SERVICE,
-        cause,
-        version: ICEORYX2_VERSION,
-        prefix: settings.prefix.clone(),
-    };
     let node = crate::link::node(settings)?;
-    let name = ServiceName::new(STATE_SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
+    let name = ServiceName::new(STATE_SERVICE).map_err(|cause| TransportError::service(STATE_SERVICE, settings, &cause))?;
     let service = crate::link::retried(|| node.service_builder(&name).event().open_or_create(), passes)
-        .map_err(|cause| unusable(format!("{cause:?}")))?;
+        .map_err(|cause| TransportError::service(STATE_SERVICE, settings, &cause))?;
     Ok((service, node))
 }
 
@@ -53,13 +49,14 @@ impl Bell {
     /// Opens the bell.
     ///
     /// # Errors
-    /// [`TransportError::Service`].
+    /// [`TransportError::Service`] or [`TransportError::Full`].
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
         let opened = open(settings)?;
-        let notifier = opened.0.notifier_builder().create().map_err(|cause| TransportError::Full {
-            service: STATE_SERVICE,
-            role: "notifier",
-            cause: format!("{cause:?}"),
+        let notifier = opened.0.notifier_builder().create().map_err(|cause| match cause {
+            NotifierCreateError::ExceedsMaxSupportedNotifiers => {
+                TransportError::Full { service: STATE_SERVICE, role: "notifier", cause: format!("{cause:?}") }
+            }
+            _ => TransportError::service(STATE_SERVICE, settings, &cause),
         })?;
         Ok(Self { notifier, _opened: opened })
     }
@@ -70,6 +67,10 @@ impl Bell {
     }
 }
 
+/// Prefix and root together, in bytes, that a listener may have: its socket is a file under the root, and Linux keeps 108 bytes for the
+/// path of one.
+const NAME_MAX: usize = 72;
+
 /// Waits for the bell.
 pub struct Listener {
     listener: iceoryx2::port::listener::Listener<ipc::Service>,
@@ -77,16 +78,30 @@ pub struct Listener {
 }
 
 impl Listener {
+    /// Can its socket have a name?
+    ///
+    /// # Errors
+    /// [`TransportError::TooLong`].
+    pub fn check(settings: &Settings) -> Result<(), TransportError> {
+        let (Settings { prefix, root }, most) = (settings, NAME_MAX);
+        if prefix.len() + root.len() > most {
+            return Err(TransportError::TooLong { prefix: prefix.clone(), root: root.clone(), most });
+        }
+        Ok(())
+    }
+
     /// Opens the listening end.
     ///
     /// # Errors
-    /// [`TransportError::Service`] or [`TransportError::Full`].
+    /// As [`Listener::check`]; [`TransportError::Service`] or [`TransportError::Full`].
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
+        Self::check(settings)?;
         let opened = open(settings)?;
-        let listener = opened.0.listener_builder().create().map_err(|cause| TransportError::Full {
-            service: STATE_SERVICE,
-            role: "listener",
-            cause: format!("{cause:?}"),
+        let listener = opened.0.listener_builder().create().map_err(|cause| match cause {
+            ListenerCreateError::ExceedsMaxSupportedListeners => {
+                TransportError::Full { service: STATE_SERVICE, role: "listener", cause: format!("{cause:?}") }
+            }
+            _ => TransportError::service(STATE_SERVICE, settings, &cause),
         })?;
         Ok(Self { listener, _opened: opened })
     }

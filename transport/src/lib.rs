@@ -15,7 +15,7 @@ mod settings;
 
 pub use error::TransportError;
 pub use event::{Bell, Listener};
-pub use link::{DEPTH_MAX, Loan, Message, Probe, Reader, Writer};
+pub use link::{DEPTH_MAX, Loan, Message, Probe, ROOM, Reader, Writer};
 pub use settings::Settings;
 
 /// `CLOCK_MONOTONIC` in nanoseconds: the one clock of all messages.

@@ -5,7 +5,7 @@
 use crate::{Settings, TransportError, now_ns, room};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::port::{DegradationAction, DegradationCause};
 use iceoryx2::prelude::{BackpressureStrategy, ServiceName, SignalHandlingMode, ZeroCopySend, ipc};
@@ -15,7 +15,7 @@ use iceoryx2::service::builder::publish_subscribe::{
 };
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use ravenpose_wire::{CorrectedPose, ICEORYX2_VERSION, POSE_SERVICE, RavenState, STATE_SERVICE};
+use ravenpose_wire::{CorrectedPose, POSE_SERVICE, RavenState, STATE_SERVICE};
 use std::cell::Cell;
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
@@ -66,6 +66,14 @@ const fn room_of_messages<T: Message>() -> u64 {
     ((T::MAX_READERS * (DEPTH_MAX + BORROWED_MAX) + HISTORY + LOANED_MAX) * (size_of::<T>() + HEAD)) as u64
 }
 
+/// Shared memory that all parties together take at most, bytes.
+pub const ROOM: u64 = ROOM_OF_SERVICE + room_of_writer::<RavenState>() + room_of_writer::<CorrectedPose>();
+
+/// What a writer takes, with the queues of all readers that may come.
+const fn room_of_writer<T: Message>() -> u64 {
+    ROOM_OF_SERVICE + room_of_messages::<T>() + T::MAX_READERS as u64 * ROOM_OF_QUEUE
+}
+
 type Factory<T> = PortFactory<ipc::Service, T, ()>;
 
 struct Opened<T: Message> {
@@ -92,13 +100,7 @@ pub(crate) fn node(settings: &Settings) -> Result<Node<ipc::Service>, TransportE
 
 fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
     let node = node(settings)?;
-    let unusable = |cause: String| TransportError::Service {
-        service: T::SERVICE,
-        cause,
-        version: ICEORYX2_VERSION,
-        prefix: settings.prefix.clone(),
-    };
-    let name = ServiceName::new(T::SERVICE).map_err(|cause| unusable(format!("{cause:?}")))?;
+    let name = ServiceName::new(T::SERVICE).map_err(|cause| TransportError::service(T::SERVICE, settings, &cause))?;
     let service = retried(
         || {
             node.service_builder(&name)
@@ -129,7 +131,7 @@ fn open<T: Message>(settings: &Settings) -> Result<Opened<T>, TransportError> {
             | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfSubscribers
             | PublishSubscribeOpenError::DoesNotSupportRequestedAmountOfNodes,
         ) => TransportError::Foreign { service: T::SERVICE, expected: T::TYPE, cause: format!("{cause:?}") },
-        _ => unusable(format!("{cause:?}")),
+        _ => TransportError::service(T::SERVICE, settings, &cause),
     })?;
     Ok(Opened { service, _node: node })
 }
@@ -196,7 +198,7 @@ impl<T: Message> Writer<T> {
     /// Any [`TransportError`] of opening; [`TransportError::Room`] when shared memory is too full; [`TransportError::Full`] while another publisher is alive.
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
         let opened = open::<T>(settings)?;
-        room::require(ROOM_OF_SERVICE + room_of_messages::<T>() + T::MAX_READERS as u64 * ROOM_OF_QUEUE)?;
+        room::require(room_of_writer::<T>())?;
         let left_out = Arc::new(AtomicU64::new(0));
         let count = Arc::clone(&left_out);
         let publisher = opened
@@ -211,12 +213,7 @@ impl<T: Message> Writer<T> {
                 PublisherCreateError::ExceedsMaxSupportedPublishers => {
                     TransportError::Full { service: T::SERVICE, role: "publisher", cause: format!("{cause:?}") }
                 }
-                _ => TransportError::Service {
-                    service: T::SERVICE,
-                    cause: format!("{cause:?}"),
-                    version: ICEORYX2_VERSION,
-                    prefix: settings.prefix.clone(),
-                },
+                _ => TransportError::service(T::SERVICE, settings, &cause),
             })?;
         // Queues to readers that came at the same moment; what fails here fails again, and is said, when sending.
         let _ = publisher.update_connections();
@@ -343,7 +340,12 @@ impl<T: Message> Reader<T> {
             .buffer_size(depth)
             .set_degradation_handler(move |cause, _| counted(&count, &cause))
             .create()
-            .map_err(|cause| TransportError::Full { service: T::SERVICE, role: "reader", cause: format!("{cause:?}") })?;
+            .map_err(|cause| match cause {
+                SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                    TransportError::Full { service: T::SERVICE, role: "reader", cause: format!("{cause:?}") }
+                }
+                _ => TransportError::service(T::SERVICE, settings, &cause),
+            })?;
         // What fails here is counted, and said when taking.
         let _ = subscriber.update_connections();
         room::take(settings)?;

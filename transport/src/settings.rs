@@ -32,6 +32,14 @@ impl Settings {
         }
     }
 
+    /// Can files be named so?
+    ///
+    /// # Errors
+    /// [`TransportError::Settings`].
+    pub fn check(&self) -> Result<(), TransportError> {
+        self.iceoryx2().map(drop)
+    }
+
     pub(crate) fn iceoryx2(&self) -> Result<Config, TransportError> {
         let mut config = Config::default();
         let bad = |what: &str, value: &str| TransportError::Settings { what: what.to_owned(), value: value.to_owned() };

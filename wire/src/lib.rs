@@ -27,6 +27,8 @@ pub const PEDAL_DOWN: i32 = 3;
 pub const STATE_SERVICE: &str = "raven/state";
 /// Name of the iceoryx2 service that carries [`CorrectedPose`].
 pub const POSE_SERVICE: &str = "raven/pose";
+/// A message whose source time is further ahead of the reader's `CLOCK_MONOTONIC` than this is of another clock, ns.
+pub const AHEAD_MAX_NS: i64 = 1_000_000;
 /// The iceoryx2 version that all peers must have.
 pub const ICEORYX2_VERSION: &str = "0.9.3";
 

@@ -1,0 +1,53 @@
+//! A controller that could not connect the service is connected later, without being restarted. A program of its own: it takes its own
+//! descriptors away.
+
+mod common;
+#[path = "common/service.rs"]
+mod service;
+
+use ravenpose_transport::Writer;
+use ravenpose_wire::RavenState;
+use service::{CONFIG, World};
+use std::time::Duration;
+
+/// Sets how many descriptors this process may have; how many it had.
+fn limit_descriptors(most: libc::rlim_t) -> libc::rlim_t {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: valid pointers.
+    unsafe {
+        assert_eq!(libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit), 0);
+        let before = std::mem::replace(&mut limit.rlim_cur, most);
+        assert_eq!(libc::setrlimit(libc::RLIMIT_NOFILE, &raw const limit), 0);
+        before
+    }
+}
+
+#[test]
+fn a_service_that_a_controller_could_not_connect_opens_its_link_anew() {
+    let world = World::new("unreached");
+    let writer = Writer::<RavenState>::open(&world.settings).expect("a writer");
+    let _process = world.start(&world.config(CONFIG), &[]);
+    let poses = world.poses();
+    let mut state = RavenState::new();
+    let mut sequence = 0;
+    let mut send = || {
+        sequence += 1;
+        state.source_time_ns = ravenpose_transport::now_ns();
+        state.seal(sequence);
+        let sent = writer.send(&state);
+        std::thread::sleep(Duration::from_millis(1));
+        sent
+    };
+    let before = limit_descriptors(1);
+    let _ = send();
+    limit_descriptors(before);
+    assert_eq!(writer.take_left_out(), 1, "the service could not be connected");
+    let mut answered = false;
+    world.until("poses of these states", || {
+        send().expect("sent");
+        answered |= poses.latest().expect("received").is_some_and(|pose| pose.sequence > 0);
+        answered
+    });
+    // What happened is said a second later.
+    world.until("words for it", || world.log().contains("do not arrive") && world.log().contains("opened anew"));
+}
