@@ -48,6 +48,8 @@ pub enum Ended {
     Stopped,
     /// It was asked to open its link anew.
     Reopen,
+    /// It was asked to open another reader of states.
+    AnotherReader,
 }
 
 /// How a wait ended.
@@ -173,8 +175,25 @@ impl<E: Estimator> Runner<E> {
             if self.shared.reopen.load(Relaxed) {
                 return Ended::Reopen;
             }
+            if self.shared.another_reader.load(Relaxed) {
+                return Ended::AnotherReader;
+            }
             self.turn();
         }
+    }
+
+    /// Opens another reader of states beside the one that hears nothing, which then goes: a publisher that could not connect that one tries
+    /// again when a reader comes. Poses go on as they are. Not real-time: nothing flows then anyway.
+    ///
+    /// # Errors
+    /// Any [`TransportError`] of opening; the reader stays what it was.
+    pub fn another_reader(&mut self, settings: &Settings) -> Result<(), TransportError> {
+        self.shared.another_reader.store(false, Relaxed);
+        let reader = Reader::open(settings, QUEUE)?;
+        if let Some(link) = &mut self.link {
+            link.reader = reader;
+        }
+        Ok(())
     }
 
     /// Drops the link and opens it anew, after the shared files were removed under it. Not real-time: nothing flows then anyway.

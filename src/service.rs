@@ -26,6 +26,8 @@ use std::time::Duration;
 /// does not count. A loop that runs takes one period; one whose core stands still is waited for.
 const STOP_TICKS: u32 = 500;
 const STOP_TICK: Duration = Duration::from_millis(1);
+/// Longest pause between two tries to open the link anew, each twice as long as the last: each reaches into the controller, too.
+const PAUSE_MAX: Duration = Duration::from_secs(1);
 
 const USAGE: &str = "\
 ravenposed - corrects the end-effector pose of a RAVEN-II in hard real time
@@ -320,9 +322,20 @@ fn spawn_loop(
                 runner.set_test_hook(hook);
             }
             let _ = ready.send(Ok(()));
-            while runner.run() == Ended::Reopen {
+            loop {
+                match runner.run() {
+                    Ended::Stopped => break,
+                    Ended::AnotherReader => {
+                        if let Err(error) = runner.another_reader(&config.transport) {
+                            let _ = trouble.try_send(format!("no other reader of states can be opened: {error}"));
+                        }
+                        continue;
+                    }
+                    Ended::Reopen => {}
+                }
                 // Not real time: there is no link.
                 let mut said = String::new();
+                let mut pause = TICK;
                 while let Err(error) = runner.reopen(&config.transport)
                     && !shared.stop.load(Relaxed)
                 {
@@ -333,7 +346,8 @@ fn spawn_loop(
                     {
                         said = text;
                     }
-                    std::thread::sleep(TICK);
+                    std::thread::sleep(pause);
+                    pause = (2 * pause).min(PAUSE_MAX);
                 }
             }
             Ok(runner.into_recorder().into_active())

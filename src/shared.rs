@@ -33,6 +33,8 @@ pub struct Shared {
     pub stop: AtomicBool,
     /// Ordinary thread to loop: leave and open the link anew.
     pub reopen: AtomicBool,
+    /// Ordinary thread to loop: leave and open another reader of states.
+    pub another_reader: AtomicBool,
     /// Moves once per turn of the loop, whether or not a state came.
     pub heartbeat: AtomicU64,
     /// Status (upper half) and flags (lower half) of each arm's last estimate.

@@ -8,7 +8,7 @@ use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
 use crate::{abort, say};
 use ravenpose_transport::{Message, Probe, Settings};
-use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag, flag_names};
+use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag_names};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,8 @@ const SECOND: Duration = Duration::from_secs(1);
 /// What the loop says while it has no link; more than a few lines a second nobody reads.
 const TROUBLES: usize = 4;
 const REMOVED: &str = "the shared files were removed under the service (RemoveIPC, a tmp cleaner?)";
-/// So often, after twice as long each time, a new link is tried while a publisher is there and silent: the last time after some eight minutes.
+/// So often in the life of a control process, after twice as long each time, another reader is tried while it is there and silent: the last time after
+/// some eight minutes.
 const SILENCE_TRIES: u32 = 9;
 /// For this long after the link was opened anew it is opened again if newcomers still do not find it.
 const REOPEN_AGAIN: Duration = Duration::from_secs(20);
@@ -74,7 +75,7 @@ pub struct Watch {
     /// When the link was first opened anew after it had worked.
     reopened: Option<Instant>,
     silent_since: Option<Instant>,
-    /// How often a new link was tried in this silence.
+    /// How often another reader was tried with this control process.
     silence_tries: u32,
 }
 
@@ -219,33 +220,30 @@ impl Watch {
             self.writer.line(format!("{REMOVED}; opening the link anew"));
             self.shared.reopen.store(true, Relaxed);
         }
-        // Nothing tries again to connect a publisher before one comes or goes; another reader does.
         let failed = std::mem::replace(&mut self.receive_failures, receive_failures) != receive_failures;
         self.deaf = failed || (self.deaf && !flows);
-        if self.deaf && !flows && publishers > 0 && !self.shared.reopen.load(Relaxed) {
+        let waits = self.shared.reopen.load(Relaxed) || self.shared.another_reader.load(Relaxed);
+        // Nothing tries again to connect a publisher and a reader before one comes or goes; another reader does.
+        if self.deaf && !flows && publishers > 0 && !waits {
             self.deaf = false;
-            self.writer.line("the control process could not be connected; opening the link anew".to_owned());
-            self.shared.reopen.store(true, Relaxed);
+            self.writer.line("the control process could not be connected; another reader is opened".to_owned());
+            self.shared.another_reader.store(true, Relaxed);
         }
-        let stale = (0..ARMS).any(|arm| self.shared.arm(arm).1 & flag::INPUT_STALE != 0);
-        let never = accepted == 0;
-        if publishers == 0 || refuses || !(stale || never) {
+        if publishers == 0 || flows || refuses {
             self.silent_since = None;
-            self.silence_tries = 0;
-        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed()
-            > 2 * SECOND * (1 << self.silence_tries.min(SILENCE_TRIES))
+            self.silence_tries = if publishers == 0 { 0 } else { self.silence_tries };
+        } else if self.silent_since.get_or_insert_with(Instant::now).elapsed() > 2 * SECOND * (1 << self.silence_tries)
+            && self.silence_tries < SILENCE_TRIES
+            && !waits
         {
-            if self.silence_tries == 0 {
-                self.writer.line(format!(
-                    "a publisher of {} is connected but its states do not arrive; it is stopped, or could not connect this reader, or runs as another user: all parties must run as the same user",
-                    RavenState::SERVICE
-                ));
-            }
             // A controller that could not connect us (no descriptor free) tries again when a reader comes, and not before.
-            if self.silence_tries < SILENCE_TRIES {
-                self.silence_tries += 1;
-                self.shared.reopen.store(true, Relaxed);
-            }
+            self.silence_tries += 1;
+            self.writer.line(format!(
+                "a publisher of {} is connected but its states do not arrive; it is stopped, or could not connect this reader, or runs as another \
+                 user: all parties must run as the same user; another reader is opened",
+                RavenState::SERVICE
+            ));
+            self.shared.another_reader.store(true, Relaxed);
         }
     }
 

@@ -117,7 +117,7 @@ const WRONG_VALUE: [(&str, &str); 29] = [
     ("[transport]\nroot = \"/ä\"", ":2:8: transport root \"/ä/\" is not usable as a file name; use letters, digits, '_' and '-'"),
     (
         "[transport]\nprefix = \"robot_\"\nroot = \"/rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr\"\n[loop]\nwait = \"event\"",
-        ":3:8: transport prefix \"robot_\" and root \"/rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr/\" together have more than the 72 bytes that wait = \"event\" leaves them; give a shorter root",
+        ":3:8: transport prefix \"robot_\" and root \"/rrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrrr/\" together have more than the 63 bytes that wait = \"event\" leaves them; give a shorter root",
     ),
     ("[gold]", ":1:1: gold.model is missing; add model = \"FILE.onnx\" to [gold]"),
     (

@@ -23,7 +23,7 @@ fn limit_descriptors(most: libc::rlim_t) -> libc::rlim_t {
 }
 
 #[test]
-fn a_service_that_a_controller_could_not_connect_opens_its_link_anew() {
+fn a_service_that_a_controller_could_not_connect_opens_another_reader() {
     let world = World::new("unreached");
     let writer = Writer::<RavenState>::open(&world.settings).expect("a writer");
     let _process = world.start(&world.config(CONFIG), &[]);
@@ -49,5 +49,5 @@ fn a_service_that_a_controller_could_not_connect_opens_its_link_anew() {
         answered
     });
     // What happened is said a second later.
-    world.until("words for it", || world.log().contains("do not arrive") && world.log().contains("opened anew"));
+    world.until("words for it", || world.log().contains("do not arrive") && world.log().contains("another reader is opened"));
 }

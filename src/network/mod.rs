@@ -5,6 +5,7 @@
 
 mod activation;
 mod deviation;
+mod examples;
 mod format;
 mod instructions;
 mod pairs;

@@ -5,7 +5,8 @@
 //! and input by input, what has been lost so far is carried over to the inputs that are yet to be rounded, as far as they vary with those
 //! before (Babai's nearest plane; GPTQ rounds large language models so). What is left on average goes into the bias.
 
-use super::{Format, TILE_OUTPUTS_MIN, deviation};
+use super::examples::show_examples;
+use super::{Format, TILE_OUTPUTS_MIN};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use ravenpose_importer::{Dense, Network};
 
@@ -32,7 +33,7 @@ pub(super) fn spreads(network: &Network) -> Vec<Option<Spread>> {
     };
     let related = layers().map(products).sum::<f64>() <= RELATED_PRODUCTS;
     let mut spreads = Vec::with_capacity(network.layers.len());
-    deviation::show_examples(network, count, |index, x| {
+    show_examples(network, count, |index, x| {
         spreads.push(inner((index, &network.layers[index])).then(|| Spread::of(x, related)));
     });
     spreads

@@ -68,8 +68,8 @@ impl Bell {
 }
 
 /// Prefix and root together, in bytes, that a listener may have: its socket is a file under the root, and Linux keeps 108 bytes for the
-/// path of one.
-const NAME_MAX: usize = 72;
+/// path of one. Beside both stands a number of up to 39 digits, and `.event`.
+const NAME_MAX: usize = 108 - 39 - 6;
 
 /// Waits for the bell.
 pub struct Listener {

@@ -99,7 +99,7 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
             channel.type_name
         );
     }
-    say!("{}: {records} records", out.display());
+    say!("{}: of {records} records", out.display());
     Ok(source.damage().map_or(ExitCode::SUCCESS, |damage| told_of(input, damage, "converted")))
 }
 

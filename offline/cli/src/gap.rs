@@ -4,7 +4,9 @@ mod live;
 mod memory;
 
 use crate::output;
-use ::gap::analysis::{Given, Options, Outcome, analyse};
+use ::gap::analysis::analyse;
+use ::gap::found::Outcome;
+use ::gap::given::{Given, Options};
 use ::gap::needed::keep_needed;
 use ::gap::parallel;
 use ::gap::search::Thresholds;

@@ -6,6 +6,7 @@
 mod output;
 
 mod check;
+mod clock;
 mod convert;
 mod evaluate;
 mod gap;
@@ -99,7 +100,7 @@ enum Command {
         /// Of a recording of both arms: the one whose tip is paired
         #[arg(long, value_parser = ["gold", "green"])]
         arm: Option<String>,
-        /// Table of pairs to write (.csv), or the whole recording with the truth in frame 0 inside, for `train` (.mcap, .bag, .252.csv,
+        /// Table of pairs to write (.csv), or the whole recording with the truth in frame 0 inside, for `train` (.mcap, .bag,
         /// .parquet); the report goes beside it as .report.json
         #[arg(long)]
         out: PathBuf,

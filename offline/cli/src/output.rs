@@ -24,7 +24,7 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
     written
 }
 
-/// Can a file be written there, and is it none of the inputs? Asked before the work whose result it is for.
+/// Is there a folder for a file, and does it replace none of the inputs and nothing else than a file? Asked before the work whose result it is for.
 pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
     let same = |input: &&Path| matches!((input.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
     if inputs.iter().any(same) {
@@ -34,10 +34,13 @@ pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         return Err(format!("{}: there is no folder {}; make it first", out.display(), folder.display()));
     }
-    if out.is_dir() {
-        return Err(format!("{}: is a folder; give the name of a file", out.display()));
+    match out.metadata() {
+        Ok(there) if there.is_dir() => Err(format!("{}: is a folder; give the name of a file", out.display())),
+        Ok(there) if !there.is_file() => {
+            Err(format!("{}: is no file, and would be replaced by one; choose another output", out.display()))
+        }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Can a folder be made there, or is it one? Asked before the work whose results it is for; `option` gives it.

@@ -43,8 +43,8 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         return Err("--offset-s: must be a number of seconds".to_owned());
     }
     let format = StateFormat::of_name(out);
-    if let Some(format @ (StateFormat::StateFile | StateFormat::Columns235 | StateFormat::Columns252)) = format {
-        return Err(format!("{}: {format:?} holds no true tip; name the output .csv, .mcap, .bag or .parquet", out.display()));
+    if let Some(StateFormat::StateFile | StateFormat::Columns235 | StateFormat::Columns252) = format {
+        return Err(format!("{}: this format holds no true tip; name the output .csv, .mcap, .bag or .parquet", out.display()));
     }
     let is_table = out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     if format.is_none() && !is_table {
@@ -117,6 +117,9 @@ fn of_one_arm(run: &Path, arm: Option<&str>) -> Result<Box<dyn TableSource>, Str
     let is_of_both = tidy::has_both_arms(source.columns());
     let held = source.metadata().iter().find(|(key, _)| key == "arm").map(|(_, held)| held.as_str());
     match arm {
+        _ if is_of_both && !is_of_states(run)? => {
+            Err(format!("{}: is a table of both arms; give the recording of states, or convert that with --arm", run.display()))
+        }
         None if is_of_both => Err(format!("{}: holds both arms; say which one with --arm gold or --arm green", run.display())),
         Some(arm) if is_of_both => table(Some(if arm == "green" { Arms::Green } else { Arms::Gold })),
         Some(arm) if held.is_some_and(|held| held != arm) => {
@@ -124,6 +127,10 @@ fn of_one_arm(run: &Path, arm: Option<&str>) -> Result<Box<dyn TableSource>, Str
         }
         _ => Ok(source),
     }
+}
+
+fn is_of_states(run: &Path) -> Result<bool, String> {
+    Ok(matches!(open(run).map_err(|error| error.to_string())?, Opened::States(_)))
 }
 
 /// The states as they are, and after the last one before each pair its true position: on the states' clock, in frame 0. Truth that

@@ -4,6 +4,7 @@
 //! with the wall clock as it was at the start plus the monotonic time since; a writing thread compresses and writes. What is
 //! written stands as `NAME.part` until the end: a kill leaves all but the last second there.
 
+use crate::clock::Clock;
 use crate::webcams::{self, Image, Webcams};
 use crossbeam_queue::ArrayQueue;
 use ravenpose::{realtime, signals};
@@ -16,7 +17,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Messages of each stream that may wait for the disk: eight seconds.
 const WAITING_MAX: usize = 8192;
@@ -39,24 +40,6 @@ uint32 status\nuint32 flags\nuint64 model_id\nuint32 reset_count\nfloat32 domain
 float64[3] correction_um\nfloat64[3] corrected_position_um\nfloat64[3] bound95_um\nfloat32[9] orientation\nuint32 hold_cycles\n\
 uint64 orientation_model_id\nfloat64[3] rotation_deg\nfloat64[3] rotation_bound95_deg\nfloat32[9] corrected_orientation\n",
 };
-
-/// The one clock: the wall's as it was at the start plus the monotonic time since.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Clock {
-    offset_ns: i64,
-}
-
-impl Clock {
-    fn start() -> Self {
-        let wall_ns = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64);
-        Self { offset_ns: wall_ns - ravenpose_transport::now_ns() }
-    }
-
-    /// A time of `CLOCK_MONOTONIC` as ns since 1970.
-    pub(crate) fn stamp(self, monotonic_ns: i64) -> u64 {
-        (monotonic_ns + self.offset_ns).max(0) as u64
-    }
-}
 
 /// What the listening thread hands over, with times in ns since 1970. Without locks or allocation: an ordinary thread that holds a lock
 /// on a busy machine would make the listener wait for longer than the link keeps messages.
@@ -109,6 +92,11 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
     }
     signals::block().map_err(|error| format!("signals cannot be blocked: {error}"))?;
     let clock = Clock::start();
+    if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
+        return Err(format!("{}: MCAP is recorded; name the output .mcap, and convert it afterwards", out.display()));
+    }
+    // What cannot be opened is refused before there is a file.
+    drop(Reader::<RavenState>::open(&Settings::from_env(), DEPTH_MAX).map_err(|error| error.to_string())?);
     let (webcams, arrived) = Webcams::open(cameras, clock)?;
     let metadata = [("recorder", "ravenpose record"), ("clock", "wall clock at the start plus CLOCK_MONOTONIC since")];
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
@@ -160,6 +148,13 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
         let gap_ms = camera.longest_gap_ns / 1_000_000;
         say!("  {name}: {} images, {} missed, {gap_ms} ms at most without one{fault}", camera.images, camera.missed);
         whole &= camera.missed == 0 && camera.fault.is_none();
+    }
+    if tally.states + tally.poses == 0 {
+        complain!(
+            "ravenpose: {}: no state and no pose was heard; do service and controller run, as this user, with this RAVENPOSE_PREFIX?",
+            out.display()
+        );
+        whole = false;
     }
     Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(LOST) })
 }

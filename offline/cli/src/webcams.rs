@@ -1,6 +1,6 @@
 //! Webcams beside the robot: a thread for each, whose images go to the recorder's file with times on its clock.
 
-use super::record::Clock;
+use crate::clock::Clock;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};

@@ -150,6 +150,8 @@ fn pairs_of_a_simulated_run_are_its_error() {
     assert!(!pairs.exists());
     // Nor is a run replaced by its picture.
     refused(&ravenpose(&["plot", text(&run), "--out", text(&run)]), &["both input and output"]);
+    refused(&ravenpose(&["plot", text(&run), "--out", text(&folder.file("run.png"))]), &[".html or .svg"]);
+    refused(&ravenpose(&["plot", text(&run), "--out", "/dev/null"]), &["is no file"]);
 }
 
 #[test]
@@ -258,6 +260,9 @@ fn of_a_recording_of_both_arms_the_one_that_is_named_is_paired() {
     assert!(simulate(&out, &["--arm", "both"]).status.success());
     let (run, pairs) = (out.join("run_0001.mcap"), folder.file("pairs.csv"));
     refused(&ravenpose(&["pair", text(&run), "--same", "--out", text(&pairs)]), &["holds both arms", "--arm green"]);
+    let table = folder.file("both.csv");
+    done(&["convert", text(&run), text(&table)]);
+    refused(&ravenpose(&["pair", text(&table), "--same", "--arm", "gold", "--out", text(&pairs)]), &["is a table of both arms"]);
     // Its states keep both arms.
     refused(&ravenpose(&["convert", text(&run), text(&folder.file("one.bag")), "--arm", "gold"]), &["leave --arm out"]);
     let error_of = |run: &Path, arm: &str| {

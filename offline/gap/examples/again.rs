@@ -1,6 +1,8 @@
 //! Feeds what was found back: the corrected model on a run that was not fitted, and the same with its main number 30 % off.
 //! For development: `again FOLDER [PART OF A NAME]`, a folder of the generator.
-use gap::analysis::{Given, Options, Outcome, analyse};
+use gap::analysis::analyse;
+use gap::found::Outcome;
+use gap::given::{Given, Options};
 use gap_report::{Report, Role};
 use simulator::model::RobotModel;
 use simulator::physics::{Physics, Value};

@@ -1,9 +1,11 @@
 //! RMS of every residual cell of one example.
 use gap::motion::{Band, Motion};
-use gap::nominal::{Nominal, rms};
-use gap::problem::{Pair, Problem};
+use gap::nominal::Nominal;
+use gap::pair::Pair;
+use gap::problem::Problem;
 use gap::robot::Robot;
 use gap::run::{Run, common};
+use gap::series::rms;
 use std::path::Path;
 
 fn main() {

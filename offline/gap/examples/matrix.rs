@@ -2,7 +2,8 @@
 use gap::hypothesis::Dictionary;
 use gap::motion::{Band, Motion};
 use gap::nominal::Nominal;
-use gap::problem::{Pair, Problem};
+use gap::pair::Pair;
+use gap::problem::Problem;
 use gap::robot::Robot;
 use gap::run::{Run, common};
 use gap::search::{Thresholds, search};
@@ -67,7 +68,7 @@ fn main() {
                 std::fs::write(path, text).expect("dump");
             }
             for cell in &problem.cells {
-                println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::nominal::rms(cell.residual.iter().copied()));
+                println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::series::rms(cell.residual.iter().copied()));
             }
         }
         let mut answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
@@ -132,8 +133,8 @@ fn main() {
                     effect.chosen.candidate.take_off(c, theta, &mut left);
                 }
                 let floor = gap::floors::floor(&problem.cells[c]);
-                let before = gap::nominal::rms(problem.cells[c].residual.iter().copied());
-                format!("{:.2}/{:.2}", before / floor, gap::nominal::rms(left.into_iter()) / floor)
+                let before = gap::series::rms(problem.cells[c].residual.iter().copied());
+                format!("{:.2}/{:.2}", before / floor, gap::series::rms(left.into_iter()) / floor)
             })
             .collect();
         let _ = write!(line, " controller {:?}", gap::controller::changed(&problem));

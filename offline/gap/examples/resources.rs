@@ -1,5 +1,6 @@
 //! Seconds and memory of each stage of an analysis: `resources REAL [SIM]`, recordings of the built-in arm. For development.
-use gap::analysis::{Given, Options, analyse};
+use gap::analysis::analyse;
+use gap::given::{Given, Options};
 use gap::needed::keep_needed;
 use recordings::tidy;
 use recordings::{Recording, table};

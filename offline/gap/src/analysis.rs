@@ -3,68 +3,27 @@
 use std::io::Write as _;
 use std::time::Instant;
 
-use gap_report::{DataQuality, Fit, FloorMethod, Level, Pictures, Report, Run as ToldRun, RunRole, Space, Status};
+use gap_report::{DataQuality, Fit, FloorMethod, Level, Report, Run as ToldRun, RunRole, Space, Status};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
+use crate::found::{Found, Outcome};
 use crate::gates;
-use crate::held_out::{HeldOut, Refused, sized};
-use crate::hypothesis::{ALWAYS, Dictionary, LATE_TORQUES, Window, Windows};
-use crate::intervals::{Estimate, estimates};
+use crate::given::{Given, Options};
+use crate::held_out::{HeldOut, beside, left, sized};
+use crate::hypothesis::{Dictionary, LATE_TORQUES};
+use crate::intervals::estimates;
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
-use crate::problem::{Pair, Problem};
+use crate::pair::Pair;
+use crate::problem::Problem;
 use crate::robot::Robot;
-use crate::run::{Both, Extent, Run, RunError, alike, as_noisy, common};
+use crate::run::{Both, Extent, Run, alike, as_noisy, common};
+use crate::run_error::RunError;
 use crate::search::{Answer, Effect, Thresholds, search};
-use crate::unexplained::Unexplained;
-use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, parallel, unexplained, verdicts};
-
-/// One run as it was given.
-#[derive(Debug)]
-pub struct Given {
-    /// Name for the report.
-    pub id: String,
-    /// The recording.
-    pub real: Recording,
-    /// SHA-256 of its file.
-    pub real_sha256: String,
-    /// Where the files of recording and simulation end early, and what should be known of them.
-    pub notes: Vec<String>,
-    /// What a simulator made of the same commands, with the SHA-256 of its file.
-    pub sim: Option<(Recording, String)>,
-}
-
-/// What decides and what is told of it.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Limits of the search.
-    pub thresholds: Thresholds,
-    /// Written into the report; the engine itself draws nothing.
-    pub seed: u64,
-    /// SHA-256 of the robot model and the options.
-    pub config_sha256: String,
-    /// Says on standard error what the search tries.
-    pub trace: bool,
-    /// SHA-256 of the URDF, if the robot came as one.
-    pub urdf_sha256: Option<String>,
-    /// Bytes of memory that are free at the moment; none where nobody knows.
-    pub free_bytes: fn() -> Option<u64>,
-}
-
-impl Default for Options {
-    /// The usual limits, and a hash of nothing.
-    fn default() -> Self {
-        Self {
-            thresholds: Thresholds::default(),
-            seed: 0,
-            config_sha256: "0".repeat(64),
-            trace: false,
-            urdf_sha256: None,
-            free_bytes: || None,
-        }
-    }
-}
+use crate::split::{HELD_OUT, held_out_of, split};
+use crate::told::{cell_quantity, cell_unit};
+use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, lag, parallel, unexplained, verdicts};
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -112,21 +71,14 @@ pub enum AnalysisError {
     },
 }
 
-/// A report with its pictures and the corrected model.
-#[derive(Debug)]
-pub struct Outcome {
-    /// The report.
-    pub report: Report,
-    /// Its pictures.
-    pub pictures: Pictures,
-    /// Text of corrected.toml; none where nothing was found.
-    pub corrected: Option<String>,
-    /// Effects that are not in corrected.toml, each with the reason.
-    pub left_out: Vec<String>,
-    /// Mean logarithm of what is left of the residuals of held-out runs; NaN where nothing was judged.
-    pub(crate) left: f64,
-    /// Times more that is left of what was held out than of what was fitted, in the channel where that is most.
-    pub(crate) elsewhere: f64,
+/// The clock of a simulation is not the recording's.
+fn another_clock(one: &Given, lag_s: f64) -> DataQuality {
+    let (ms, when) = (lag_s.abs() * 1e3, if lag_s > 0.0 { "later" } else { "earlier" });
+    let message = format!(
+        "the simulation of {} has the same commands {ms:.1} ms {when} than the recording: its clock is another one, and was set back by that; give          both on one clock",
+        one.id
+    );
+    DataQuality::new("same_clock", Level::Warn, message).run(one.id.clone()).value(lag_s, "s")
 }
 
 /// Where the simulations of some runs could be compared sample by sample, and that of another cannot.
@@ -142,76 +94,12 @@ fn only_taught(runs: &[Both], comparable: &[bool]) -> Option<DataQuality> {
     })
 }
 
-/// What the search and the judgement have in common; for the parts that put it into words.
-pub struct Found<'a> {
-    /// The robot.
-    pub robot: &'a Robot,
-    /// What is believed of it.
-    pub nominal: &'a Nominal,
-    /// Residuals of the fit.
-    pub problem: &'a Problem<'a>,
-    /// Their columns.
-    pub dictionary: &'a Dictionary<'a>,
-    /// Residuals of what was held out.
-    pub held: &'a Problem<'a>,
-    /// Their columns.
-    pub held_dictionary: &'a Dictionary<'a>,
-    /// What the search found.
-    pub answer: &'a Answer<'a>,
-    /// Sizes of the effects.
-    pub estimates: &'a [Estimate],
-    /// When each effect is there in what was held out.
-    pub held_windows: &'a [Option<Windows>],
-    /// The ceiling.
-    pub ceiling: &'a flexible::Ceiling,
-    /// Noise floor of each cell, fixed before the fit.
-    pub floors: &'a [f64],
-    /// How it was found.
-    pub floor_methods: &'a [FloorMethod],
-    /// Likeliest values of what is known only roughly, per cell.
-    pub beside: &'a [Vec<f64>],
-    /// A controller that is not the simulation's.
-    pub controller: Option<crate::controller::Changed>,
-    /// Was the nominal model learnt from a simulation? Not from one whose input is reversed.
-    pub learnt: bool,
-    /// Is there something that the library does not explain?
-    pub unmodelled: bool,
-    /// What explained most, and not what was held out.
-    pub refused: Option<&'a Refused>,
-    /// Something far above the noise where nothing was found.
-    pub unexplained: Option<Unexplained>,
-}
-
-impl Found<'_> {
-    /// When an effect is there in a run that was held out.
-    pub(crate) fn window_there(&self, effect: usize, run: usize) -> Window {
-        self.held_windows[effect].as_ref().map_or(ALWAYS, |windows| windows.of(run))
-    }
-
-    /// Is nothing of an effect in any run that was held out?
-    pub(crate) fn is_absent(&self, effect: usize) -> bool {
-        self.held_windows[effect].as_ref().is_some_and(Windows::is_never)
-    }
-
-    /// Is what was held out a later part of the only run?
-    pub(crate) fn is_later_part(&self) -> bool {
-        self.held_out().is_later_part()
-    }
-
-    /// What was held out.
-    pub(crate) fn held_out(&self) -> HeldOut<'_> {
-        HeldOut { problem: self.problem, dictionary: self.held_dictionary, floors: self.floors }
-    }
-}
-
 /// Least length of what is fitted on, s.
 const SHORTEST_S: f64 = 6.0;
 /// Fewest rows of a run.
 const LEAST_ROWS: usize = 20;
 /// Of what follows the smoothing at its peak, per row of the fit and joint, a tenth to spare (`examples/resources.rs`, 20 minutes).
 const LIBRARY_BYTES: f64 = 24_000.0;
-/// Share of a single run that is held out.
-const HELD_OUT: f64 = 1.0 / 3.0;
 /// Length of a block, s; long runs take longer ones.
 const BLOCK_S: f64 = 1.5;
 /// Most blocks; of many runs two for each all the same.
@@ -348,10 +236,18 @@ fn analyse_with(
     let mut comparable = vec![false; given.len()];
     let mut from_recording = false;
     let mut wrong = Vec::new();
+    let mut clocks = Vec::new();
     for (k, one) in given.iter().enumerate() {
         let real = Run::new(&one.real, &robot)?;
         let sim = match &one.sim {
-            Some((sim, _)) => Some(Run::new(sim, &robot)?),
+            Some((sim, _)) => {
+                let mut sim = Run::new(sim, &robot)?;
+                if let Some(lag_s) = lag::of_commands(&real, &sim) {
+                    sim.start_s -= lag_s;
+                    clocks.push(another_clock(one, lag_s));
+                }
+                Some(sim)
+            }
             // What stands in for it, where it can.
             None => simulated.get(k).and_then(Option::as_ref).and_then(|sim| Run::new(sim, &robot).ok()),
         };
@@ -384,6 +280,7 @@ fn analyse_with(
         });
     }
     let mut quality = gates::check(&robot, &runs);
+    quality.append(&mut clocks);
     for one in given {
         quality.extend(one.notes.iter().map(|note| DataQuality::new("file", Level::Warn, note.clone()).run(one.id.clone())));
     }
@@ -491,13 +388,12 @@ fn analyse_with(
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {
-            crate::nominal::rms(verdicts::left(&problem, c, &sized(&answer.effects, &estimates)).into_iter())
-                >= problem.practical.any[c]
+            crate::series::rms(left(&problem, c, &sized(&answer.effects, &estimates)).into_iter()) >= problem.practical.any[c]
         })
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats
         && ceiling.library_nats < REACH * ceiling.together_nats;
-    let beside = verdicts::beside(&problem, &answer.effects, &estimates);
+    let beside = beside(&problem, &answer.effects, &estimates);
     let (_, held_windows) = held_out.there(&sized(&answer.effects, &estimates));
     // What the controller acts on is what was logged, but where motors or torques are logged late.
     let late = answer.effects.iter().zip(&estimates).any(|(effect, estimate)| {
@@ -547,10 +443,10 @@ fn analyse_with(
     let mut outcome = verdicts::outcome(&found, &extents, given, options, quality, corrected, &again.fits);
     outcome.report.timing.simulate_s = Some(simulate_s);
     let left: Vec<f64> = (0..problem.cells.len())
-        .filter_map(|c| verdicts::held_out(&found, c))
-        .map(|(_, _, after)| crate::nominal::rms(after.into_iter()).max(1e-300).ln())
+        .filter_map(|c| found.before_and_after(c))
+        .map(|(_, _, after)| crate::series::rms(after.into_iter()).max(1e-300).ln())
         .collect();
-    outcome.left = crate::nominal::mean(&left);
+    outcome.left = crate::series::mean(&left);
     if matches!(prior, Prior::Exact) {
         outcome.elsewhere = times_more(&problem, &held_problem, &floors);
     }
@@ -632,29 +528,11 @@ fn too_few(seconds: f64) -> DataQuality {
     DataQuality::new("gaps", Level::Fail, message).value(seconds, "s")
 }
 
-/// What is fitted on, and what is held out: the last quarter of the runs, at least one; of a single run its last third.
-fn split(mut runs: Vec<Both>) -> (Vec<Both>, Vec<Both>) {
-    if let [(real, sim)] = runs.as_slice() {
-        let cut = (real.len() as f64 * (1.0 - HELD_OUT)) as usize;
-        // A second between them, so that neither window nor memory reaches over.
-        let gap = (1.0 / real.dt_s) as usize;
-        let part = |from: usize, to: usize| (real.slice(from, to), sim.as_ref().map(|sim| sim.slice(from, to)));
-        return (vec![part(0, cut)], vec![part((cut + gap).min(real.len() - 1), real.len())]);
-    }
-    let held = runs.split_off(runs.len() - held_out_of(runs.len()));
-    (runs, held)
-}
-
-/// How many of several runs are held out.
-pub(crate) fn held_out_of(runs: usize) -> usize {
-    (runs / 4).max(1)
-}
-
 /// What to know where the effects leave far more of what was held out than of what was fitted, in the channel where that is most.
 fn more_there(found: &Found) -> Option<DataQuality> {
     let of_cell = |c: usize| {
-        let (there, _, after) = verdicts::held_out(found, c)?;
-        let fitted = verdicts::left(found.problem, c, &sized(&found.answer.effects, found.estimates));
+        let (there, _, after) = found.before_and_after(c)?;
+        let fitted = left(found.problem, c, &sized(&found.answer.effects, found.estimates));
         let asked = found.problem.nuisances[c].columns.is_empty();
         let sizes = (found.held.cells[there].rms(&after), found.problem.cells[c].rms(&fitted).max(found.floors[c]));
         asked.then_some((c, sizes.0, sizes.1))
@@ -663,7 +541,7 @@ fn more_there(found: &Found) -> Option<DataQuality> {
     let asked = !found.answer.effects.is_empty() && !found.is_later_part();
     let (c, there, fitted) = all.max_by(|a, b| (a.1 / a.2).total_cmp(&(b.1 / b.2))).filter(|_| asked)?;
     let cell = &found.problem.cells[c];
-    let (what, unit) = (verdicts::cell_quantity(found.robot, cell), verdicts::cell_unit(found.robot, cell));
+    let (what, unit) = (cell_quantity(found.robot, cell), cell_unit(found.robot, cell));
     let runs: Vec<&str> = found.held.pairs.iter().map(|pair| pair.real.run.id.as_str()).collect();
     let message = format!(
         "with this, {what} is off by {fitted:.2e} {unit} RMS in what was fitted and by {there:.2e} in what was held out: something may be \
@@ -678,7 +556,7 @@ fn times_more(fitted: &Problem, held: &Problem, floors: &[f64]) -> f64 {
     let size = |problem: &Problem, cell: usize| problem.cells[cell].rms(&problem.cells[cell].residual);
     let of_cell = |c: usize| {
         let there = held.cell(fitted.cells[c].channel, fitted.cells[c].index)?;
-        let least = floors[c].max(fitted.practical.any[c]);
+        let least = floors[c].max(fitted.practical.any[c]).max(fitted.own_error(c));
         fitted.nuisances[c].columns.is_empty().then(|| size(held, there) / size(fitted, c).max(least).max(1e-300))
     };
     (0..fitted.cells.len()).filter_map(of_cell).fold(0.0, f64::max)

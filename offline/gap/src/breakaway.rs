@@ -24,7 +24,7 @@ pub(crate) fn levels(robot: &Robot, run: &Run) -> Vec<DataQuality> {
             let smooth = Window::new((2.0 * run.dt_s).max(0.02), run.dt_s).apply(&torque[j], 0);
             let all = events(&run.position[j], &smooth, run.dt_s);
             let n = all.len() as f64;
-            let mean = crate::nominal::mean(&all);
+            let mean = crate::series::mean(&all);
             let spread = (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
             if all.len() < LEAST || spread > SPREAD * mean {
                 return None;
@@ -45,14 +45,14 @@ pub(crate) fn levels(robot: &Robot, run: &Run) -> Vec<DataQuality> {
 
 /// Size of the effort at each break-away.
 fn events(position: &[f64], effort: &[f64], dt_s: f64) -> Vec<f64> {
-    let (low, high) = crate::nominal::range(position.iter().copied());
+    let (low, high) = crate::series::range(position.iter().copied());
     let travel = high - low;
     let rest = ((REST_S / dt_s) as usize).max(2);
     let mut all = Vec::new();
     let mut i = rest;
     while i < position.len() {
         let before = &position[i - rest..=i];
-        let (low, high) = crate::nominal::range(before.iter().copied());
+        let (low, high) = crate::series::range(before.iter().copied());
         if travel <= 0.0 || high - low > STANDS * travel {
             i += 1;
             continue;

@@ -1,6 +1,6 @@
 //! The uniform clock that a run is laid on, and the times that cannot be one.
 
-use crate::run::RunError;
+use crate::run_error::RunError;
 
 /// Samples of the uniform clock per row of the file at most: further apart, a time is taken for wrong.
 const SPREAD: f64 = 20.0;

@@ -7,16 +7,17 @@ use gap_report::{DataQuality, Fit, FloorMethod, Level, Space};
 use recordings::Recording;
 use simulator::model::RobotModel;
 
-use crate::analysis::{Found, Given};
 use crate::builtin::{along_commands, along_torque};
+use crate::cell::{Cell, Channel};
 use crate::floors::floor;
+use crate::found::Found;
+use crate::given::Given;
 use crate::motion::{Band, Motion};
-use crate::nominal::rms;
 use crate::parallel;
-use crate::problem::{Cell, Channel};
 use crate::robot::Robot;
 use crate::run::{Run, common};
-use crate::verdicts::{cell_name, cell_quantity, cell_unit, main_cell};
+use crate::series::rms;
+use crate::told::{cell_name, cell_quantity, cell_unit, main_cell};
 
 /// The check under which is told what could not be simulated.
 const CHECK: &str = "simulated again";
@@ -222,7 +223,7 @@ fn interval(played: &[Played], before: &Cell, after: &Cell, floor: f64) -> Optio
         })
         .collect();
     let (without, n) = (without?, blocks.len() as f64);
-    let mean = crate::nominal::mean(&without);
+    let mean = crate::series::mean(&without);
     let variance = (n - 1.0) / n * without.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
     (blocks.len() > 2 && variance.is_finite()).then(|| 1.96 * variance.sqrt())
 }

@@ -3,9 +3,9 @@
 
 use gap_report::{DataQuality, Level};
 
-use crate::nominal::{mean, range, rms};
 use crate::robot::Robot;
 use crate::run::{Both, Run, alike, apart, common};
+use crate::series::{mean, range, rms};
 
 /// Times a joint's own range that nothing moves: degrees for radians are 57 times, millimetres for metres 1000.
 const BEYOND_RANGE: f64 = 8.0;
@@ -55,22 +55,49 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
     let mut all = Vec::new();
     for j in 0..robot.joint_count() {
         all.extend(too_far(robot, runs, j));
+        all.extend(measured(robot, runs, j));
         let both: Vec<(&Run, &Run)> = runs.iter().filter_map(|(real, sim)| Some((real, sim.as_ref()?))).collect();
         if both.is_empty() {
             continue;
         }
-        let position = Compared { robot, what: "position", joint: j, most: POSITION_SCALE, alike: POSITION_ALIKE };
+        let named = |what: &str| format!("{what} of {}", robot.joints[j]);
+        let position =
+            Compared { what: named("position"), than: "that of the simulation", most: POSITION_SCALE, alike: POSITION_ALIKE };
         let of: Vec<_> = both.iter().map(|(real, sim)| (&real.position[j][..], &sim.position[j][..])).collect();
         all.extend(position.fails(&of, &both[0].0.id));
         let of: Option<Vec<_>> =
             both.iter().map(|(real, sim)| Some((&real.torque.as_ref()?[j][..], &sim.torque.as_ref()?[j][..]))).collect();
         // Of other motions the torques are others.
         if let Some(of) = of.filter(|_| both.iter().all(|(real, sim)| alike(real, sim))) {
-            let torque = Compared { what: "torque", most: TORQUE_SCALE, alike: TORQUE_ALIKE, ..position };
+            let torque = Compared { what: named("torque"), most: TORQUE_SCALE, alike: TORQUE_ALIKE, ..position };
             all.extend(torque.fails(&of, &both[0].0.id));
         }
     }
+    all.extend((0..3).filter_map(|axis| tip(runs, axis)));
     all
+}
+
+/// What measures a joint goes with what is reported of it.
+fn measured(robot: &Robot, runs: &[Both], j: usize) -> Option<DataQuality> {
+    let sources = || runs.iter().flat_map(|(real, sim)| std::iter::once(real).chain(sim));
+    let of: Option<Vec<_>> = runs.iter().map(|(real, _)| Some((&real.truth.as_ref()?[j][..], &real.position[j][..]))).collect();
+    let what = format!("measured position of {}", robot.joints[j]);
+    let compared = Compared { what, than: "that which is reported", most: POSITION_SCALE, alike: POSITION_ALIKE };
+    let points = sources().any(|run| run.points);
+    of.filter(|_| !points).and_then(|of| compared.fails(&of, &runs[0].0.id))
+}
+
+/// A tip as it is measured on both sides.
+fn tip(runs: &[Both], axis: usize) -> Option<DataQuality> {
+    let of = |(real, sim): &Both| -> Option<(Vec<f64>, Vec<f64>)> {
+        let (real, sim) = (real.tip.as_ref()?, sim.as_ref()?.tip.as_ref()?);
+        let both = real[axis].iter().zip(&sim[axis]).filter(|(a, b)| a.is_finite() && b.is_finite());
+        Some(both.map(|(a, b)| (*a, *b)).unzip())
+    };
+    let all: Vec<(Vec<f64>, Vec<f64>)> = runs.iter().map(of).collect::<Option<_>>()?;
+    let of: Vec<(&[f64], &[f64])> = all.iter().map(|(real, sim)| (&real[..], &sim[..])).collect();
+    let what = format!("tip position along {}", ["x", "y", "z"][axis]);
+    Compared { what, than: "that of the simulation", most: POSITION_SCALE, alike: POSITION_ALIKE }.fails(&of, &runs[0].0.id)
 }
 
 /// A joint that moves further than it can.
@@ -94,22 +121,19 @@ fn too_far(robot: &Robot, runs: &[Both], j: usize) -> Option<DataQuality> {
     })
 }
 
-/// One quantity of a joint, of which there are a recording and a simulation.
-#[derive(Clone, Copy)]
-struct Compared<'a> {
-    robot: &'a Robot,
-    what: &'static str,
-    joint: usize,
+/// One quantity, and another that it should be.
+struct Compared {
+    what: String,
+    than: &'static str,
     /// Times that one side may be the other.
     most: f64,
     /// Least correlation.
     alike: f64,
 }
 
-impl Compared<'_> {
+impl Compared {
     /// A scale or a sign that differs in every run.
-    fn fails(self, runs: &[(&[f64], &[f64])], first: &str) -> Option<DataQuality> {
-        let joint = &self.robot.joints[self.joint];
+    fn fails(&self, runs: &[(&[f64], &[f64])], first: &str) -> Option<DataQuality> {
         let all: Vec<(f64, f64)> = runs.iter().filter_map(|(real, sim)| correlation_and_scale(real, sim)).collect();
         if all.len() < runs.len() || all.is_empty() {
             return None;
@@ -117,15 +141,15 @@ impl Compared<'_> {
         let scale = mean(&all.iter().map(|(_, scale)| *scale).collect::<Vec<_>>());
         if all.iter().all(|(c, s)| *c > self.alike && (*s > self.most || *s < 1.0 / self.most)) {
             let message = format!(
-                "{} of {joint} is {scale:.3} times that of the simulation and goes like it: one of them is in another unit; convert it",
-                self.what
+                "{} is {scale:.3} times {} and goes like it: one of them is in another unit; convert it",
+                self.what, self.than
             );
             return Some(DataQuality::new("input_scale", Level::Fail, message).run(first).value(scale, "1"));
         }
         if all.iter().all(|(c, s)| *c < -self.alike && *s < self.most && *s > 1.0 / self.most) {
             let message = format!(
-                "{} of {joint} has the other sign than in the simulation (correlation {:+.2}): turn it round on the side where it is wrong",
-                self.what, all[0].0
+                "{} has the other sign than {} (correlation {:+.2}): turn it round on the side where it is wrong",
+                self.what, self.than, all[0].0
             );
             return Some(DataQuality::new("sign_convention", Level::Fail, message).run(first).value(all[0].0, "1"));
         }

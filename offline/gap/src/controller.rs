@@ -6,8 +6,9 @@
 
 use crate::linear::least_squares;
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, less_means, rms};
+use crate::nominal::Evaluator;
 use crate::problem::Problem;
+use crate::series::{less_means, rms};
 
 /// Share of the simulation's torque that its law may leave.
 const LAW: f64 = 0.1;

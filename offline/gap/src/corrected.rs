@@ -4,14 +4,15 @@ use recordings::Recording;
 use simulator::model::{Bound, Connection, Effect, RobotModel};
 use simulator::physics::{
     Backlash, CableStretch, Channel as DelayChannel, CoulombFriction, JointCoupling, JointOffset, LinkGeometry, MotorTorqueScale,
-    Parameters, Payload, Physics, TransmissionRatio, Value, ViscousFriction,
+    Parameters, Payload, Physics, TorqueRipple, TransmissionRatio, Value, ViscousFriction,
 };
 
 use arm::serial::{LinkInertia, PARAMETERS};
 use nalgebra::Vector3;
 
-use crate::analysis::{Found, Given};
 use crate::builtin::along_motion;
+use crate::found::Found;
+use crate::given::Given;
 use crate::hypothesis::{
     ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, Window, direction,
 };
@@ -139,7 +140,8 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
     let same = |effect: &&mut Effect| {
         effect.physics.name() == more.physics.name() && effect.bound == more.bound && always(effect) && always(more)
     };
-    let Some(own) = model.effects_mut().iter_mut().find(same) else { return false };
+    let Some(at) = model.effects_mut().iter_mut().position(|mut effect| same(&mut effect)) else { return false };
+    let own = &mut model.effects_mut()[at];
     let both = match (own.physics, more.physics) {
         (Physics::CoulombFriction(a), Physics::CoulombFriction(b)) if a.asymmetry == 0.0 && b.asymmetry == 0.0 => {
             Physics::CoulombFriction(CoulombFriction { f_c: a.f_c + sign * b.f_c, ..a })
@@ -163,6 +165,10 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
         (Physics::MotorTorqueScale(a), Physics::MotorTorqueScale(b)) if a.d_0 == 0.0 && b.d_0 == 0.0 => {
             Physics::MotorTorqueScale(MotorTorqueScale { kappa: a.kappa * b.kappa, ..a })
         }
+        (Physics::TorqueRipple(a), Physics::TorqueRipple(b)) if a.order == b.order => {
+            let [sine, cosine] = [f64::cos, f64::sin].map(|part| a.amplitude * part(a.phase) + sign * b.amplitude * part(b.phase));
+            Physics::TorqueRipple(TorqueRipple { amplitude: sine.hypot(cosine), phase: cosine.atan2(sine), ..a })
+        }
         (Physics::Payload(a), Physics::Payload(b)) => {
             let mass_kg = a.mass_kg + sign * b.mass_kg;
             let moment = |k: usize| a.mass_kg * a.centre_m[k] + sign * b.mass_kg * b.centre_m[k];
@@ -170,15 +176,35 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
         }
         _ => return false,
     };
+    let (before, after) = (amount(&own.physics), amount(&both));
+    if after < 0.0 && -after < NOTHING * before {
+        // All of it is gone, as far as its size is known.
+        model.effects_mut().remove(at);
+        return true;
+    }
     // What is below nothing is not one of its kind: the caller is told when it is read again.
     own.physics = both;
     own.source.clone_from(&more.source);
     true
 }
 
+/// Share of an effect by which more than all of it may seem to be gone.
+const NOTHING: f64 = 0.1;
+
+/// How much there is of what cannot be less than nothing; 1 of anything else.
+fn amount(physics: &Physics) -> f64 {
+    match physics {
+        Physics::CoulombFriction(friction) => friction.f_c,
+        Physics::ViscousFriction(friction) => friction.b,
+        Physics::Backlash(play) => play.b,
+        Physics::CableStretch(cable) => 1.0 / cable.k,
+        _ => 1.0,
+    }
+}
+
 /// An effect and where it is, in words.
 fn named(found: &Found, candidate: &Candidate) -> String {
-    let places = crate::verdicts::joints(found.robot, candidate);
+    let places = crate::told::joints(found.robot, candidate);
     let at = if places.is_empty() { String::new() } else { format!(" of {}", places.join(" and ")) };
     format!("{}{at}", candidate.family.physics.replace('_', " "))
 }

@@ -5,7 +5,6 @@ use gap_report::{Experiment, Physics};
 use crate::hypothesis::Candidate;
 use crate::robot::Robot;
 use crate::search::Scored;
-use crate::verdicts::experiment_of;
 
 /// What decides between two.
 const SEPARATORS: [(&str, &str, &str, &[&str], f64); 13] = [
@@ -128,4 +127,9 @@ pub(crate) fn suggest(robot: &Robot, candidate: &Candidate, close: &[&Scored], r
     let mut experiment = experiment_of(&format!("{goal} ({joint})"), rivals, steps);
     experiment.duration_s = Some(seconds);
     experiment
+}
+
+/// For signatures that need nothing else.
+fn experiment_of(goal: &str, rivals: Vec<Physics>, steps: &[&str]) -> Experiment {
+    Experiment::new(goal, rivals, steps.iter().map(|s| (*s).to_owned()).collect())
 }

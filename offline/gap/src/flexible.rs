@@ -1,9 +1,9 @@
 //! What a flexible predictor gains that knows no physics: the ceiling against which the library is held
 //! (gap-design.md, section 7, rule 7).
 
+use crate::cell::Cell;
 use crate::hypothesis::{Column, Dictionary};
 use crate::nominal::sign_series;
-use crate::problem::Cell;
 use crate::score::{Fit, Grams, Scorer};
 
 /// The ceiling beside the library.
@@ -28,17 +28,17 @@ fn features(dictionary: &Dictionary, cell: &Cell) -> Vec<(&'static str, Vec<f64>
     let motion = |r: usize| &problem.pairs[r].real;
     let mut all = Vec::new();
     let joints: Vec<usize> = match cell.channel {
-        crate::problem::Channel::EndEffector => (0..n).collect(),
+        crate::cell::Channel::EndEffector => (0..n).collect(),
         _ => std::iter::once(cell.index).chain((0..n).filter(|j| *j != cell.index)).collect(),
     };
     for (rank, &j) in joints.iter().enumerate() {
         let q = dictionary.at_grid(|r, i, _| motion(r).position[j][i]);
         let v = dictionary.at_grid(|r, i, _| motion(r).velocity[j][i]);
-        let mid = crate::nominal::mean(&q);
+        let mid = crate::series::mean(&q);
         let spread = (0.5 * dictionary.travel(j)).max(1e-9);
         let x: Vec<f64> = q.iter().map(|q| (q - mid) / spread).collect();
         let power = |k: i32| x.iter().map(|x| x.powi(k)).collect::<Vec<f64>>();
-        let (own, cell_own) = (rank == 0, cell.channel != crate::problem::Channel::EndEffector);
+        let (own, cell_own) = (rank == 0, cell.channel != crate::cell::Channel::EndEffector);
         all.push((if own && cell_own { "position" } else { "position of another joint" }, x.clone()));
         all.push((if own && cell_own { "posture" } else { "posture of the others" }, power(2)));
         all.push((if own && cell_own { "velocity" } else { "velocity of another joint" }, v.clone()));
@@ -128,7 +128,7 @@ pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none
 /// Features of one cell as columns.
 fn cell_columns(dictionary: &Dictionary, c: usize) -> Vec<(&'static str, Column)> {
     let cell = &dictionary.problem.cells[c];
-    let on_grid = cell.channel != crate::problem::Channel::EndEffector;
+    let on_grid = cell.channel != crate::cell::Channel::EndEffector;
     let column = |series: Vec<f64>| {
         let mut column = Column::default();
         column.push(Some(c), &if on_grid { series } else { dictionary.to_tip(&series) });

@@ -2,9 +2,10 @@
 
 use gap_report::FloorMethod;
 
-use crate::nominal::{less_means, mean, noise_of, rms, robust_deviation};
-use crate::problem::{Cell, Problem};
+use crate::cell::Cell;
+use crate::problem::Problem;
 use crate::run::Run;
+use crate::series::{less_means, mean, noise_of, rms, robust_deviation};
 
 /// Points whose likest other is looked for, at most: enough for a median.
 const ASKED: usize = 2000;

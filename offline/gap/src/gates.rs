@@ -5,10 +5,11 @@ use gap_report::{DataQuality, Level};
 use recordings::Recording;
 
 use crate::motion::Motion;
-use crate::nominal::{Nominal, rms};
+use crate::nominal::Nominal;
 use crate::robot::Robot;
 use crate::run::{Both, Run, apart};
 use crate::saturation::Saturated;
+use crate::series::rms;
 
 /// Speed that counts as motion, of the largest speed.
 const MOVING: f64 = 0.05;
@@ -55,7 +56,7 @@ fn input_sign(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         (0..n)
             .map(|j| {
                 let each: Option<Vec<f64>> = runs.iter().map(|run| of(run, j)).collect();
-                each.map(|e| crate::nominal::mean(&e))
+                each.map(|e| crate::series::mean(&e))
             })
             .collect()
     };
@@ -107,7 +108,7 @@ fn itself(real: &Run, sim: &Run) -> Option<DataQuality> {
 fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
     (0..robot.joint_count())
         .filter_map(|j| {
-            let (low, high) = crate::nominal::range(run.position[j].iter().copied());
+            let (low, high) = crate::series::range(run.position[j].iter().copied());
             (high - low < 1e-4).then(|| {
                 let message = format!(
                     "{} does not move: nothing can be said of its friction or transmission; move every joint",

@@ -5,10 +5,10 @@
 use crate::held_windows;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
-use crate::nominal::{less_means, mean};
 use crate::problem::Problem;
 use crate::search::{Answer, Effect, Scored, Thresholds};
-use crate::verdicts::{left, main_cell};
+use crate::series::{less_means, mean};
+use crate::told::main_cell;
 
 /// Of the squared size of an effect, what it has to leave less of what was held out at least: 1 where it is as it was fitted, -1 where it has
 /// nothing to do with what is there; 0 where it is half of what it should be.
@@ -59,6 +59,22 @@ pub(crate) fn sized<'a>(effects: &'a [Effect], estimates: &'a [Estimate]) -> Vec
 /// All but one of them.
 pub(crate) fn others<'a>(all: &[Sized<'a>], without: usize) -> Vec<Sized<'a>> {
     all.iter().enumerate().filter(|(k, _)| *k != without).map(|(_, one)| *one).collect()
+}
+
+/// Likeliest values of what is known only roughly beside all effects, per cell.
+pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
+    let all = sized(effects, estimates);
+    let left = |c: usize| left(problem, c, &all);
+    (0..problem.cells.len()).map(|c| problem.nuisances[c].estimate(&left(c))).collect()
+}
+
+/// What effects leave of the residual of a cell.
+pub(crate) fn left(problem: &Problem, c: usize, effects: &[Sized]) -> Vec<f64> {
+    let mut left = problem.cells[c].residual.clone();
+    for (candidate, coefficients) in effects {
+        candidate.take_off(c, coefficients, &mut left);
+    }
+    left
 }
 
 /// An effect that explains what was fitted and not what was held out.

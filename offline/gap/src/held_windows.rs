@@ -1,9 +1,10 @@
 //! When an effect is there in what was held out. Its size is not fitted there; when it comes and goes may be, as far as it is otherwise in each
 //! run: nobody picks a weight up at the same time twice.
 
+use crate::cell::Channel;
 use crate::hypothesis::{ALWAYS, Candidate, NEVER, Window, Windows, with_both_edges, with_one_edge};
-use crate::problem::{Channel, Problem};
-use crate::verdicts::main_cell;
+use crate::problem::Problem;
+use crate::told::main_cell;
 
 /// Steps of the grid of edges in a run, and halvings of one until an edge is settled.
 const EDGES: usize = 24;

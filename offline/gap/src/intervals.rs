@@ -1,13 +1,14 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, START, STRIBECK_RANGE, rounds};
-use crate::nominal::{Nominal, rms};
+use crate::nominal::Nominal;
 use crate::parallel;
 use crate::parameters::{Named, parameters};
 use crate::refine;
 use crate::robot::Robot;
 use crate::score::{Grams, Scorer};
 use crate::search::{Effect, score_scale};
+use crate::series::rms;
 
 /// An instant, s from the start of a run, with its 95 % interval.
 pub type Edge = (f64, [f64; 2]);

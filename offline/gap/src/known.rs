@@ -1,15 +1,17 @@
 //! What a model with effects already holds: a corrected model is known no better than the forms of its effects are.
 
-use simulator::model::{Bound, ModelError, RobotModel};
+use simulator::model::{ModelError, RobotModel};
 
-use crate::analysis::Given;
 use crate::builtin::along_motion;
+use crate::cell::{Cell, Channel};
+use crate::given::Given;
 use crate::motion::{Band, Motion};
-use crate::nominal::rms;
+use crate::pair::held;
 use crate::parallel;
-use crate::problem::{Cell, Channel, Problem, held};
-use crate::robot::Robot;
+use crate::problem::Problem;
+use crate::robot::{Robot, effects_of};
 use crate::run::{Run, common};
+use crate::series::rms;
 
 /// Share of what the model's effects do in a cell that a further effect must have there to be one: less is what the form of
 /// the first one gets wrong. Half of the 20 % by which a gravely wrong form misses; a parameter 30 % off stands far above.
@@ -20,16 +22,6 @@ const BEYOND: f64 = 1.2;
 /// The same of more or less of an effect that the model has: of an error of another form a part passes for it.
 const PASSES: f64 = 0.4;
 
-/// Physics and joints of the effects of a model, as families of hypotheses have them.
-pub(crate) fn effects(model: &RobotModel) -> Vec<(String, Vec<usize>)> {
-    let joints = |bound: Bound| match bound {
-        Bound::Joint(joint) | Bound::Motor(joint) | Bound::Link(joint) => vec![joint],
-        Bound::Pair(driven, driver) => vec![driven, driver],
-        Bound::Channel(_) | Bound::Robot => Vec::new(),
-    };
-    model.effects().iter().map(|effect| (effect.physics.name().to_owned(), joints(effect.bound))).collect()
-}
-
 /// Raises what an effect must amount to: beyond the model's own error, and a share of what its effects do.
 pub(crate) fn put_on(problem: &mut Problem, model: &RobotModel, given: &[Given], band: Band) {
     let done = done(model, problem, given, band);
@@ -39,7 +31,7 @@ pub(crate) fn put_on(problem: &mut Problem, model: &RobotModel, given: &[Given],
         practical.any[c] = practical.any[c].max(BEYOND * error).max(OF_KNOWN * done[c]);
         practical.known[c] = practical.known[c].max(PASSES * error).max(OF_KNOWN * done[c]);
     }
-    practical.effects = effects(model);
+    practical.effects = effects_of(model);
 }
 
 /// RMS of what the model's own effects do in each cell.

@@ -29,8 +29,8 @@ impl Band {
         let lost = |series: &[f64]| {
             let quick = Window::new(Self::FAST.sigma_s.max(1.5 * run.dt_s), run.dt_s).apply(series, 0);
             let slow = Window::new(Self::SLOW.sigma_s, run.dt_s).apply(series, 0);
-            let mean = crate::nominal::mean(series);
-            let size = |x: &mut dyn Iterator<Item = f64>| crate::nominal::rms(x);
+            let mean = crate::series::mean(series);
+            let size = |x: &mut dyn Iterator<Item = f64>| crate::series::rms(x);
             size(&mut quick.iter().zip(&slow).map(|(q, s)| q - s)) > 0.7 * size(&mut quick.iter().map(|q| q - mean))
         };
         let moving = || run.position.iter().enumerate().filter(|(j, series)| robot.moves(*j, series)).map(|(_, series)| series);

@@ -9,6 +9,7 @@ use simulator::physics::smooth_sign;
 use crate::linear::{dot, least_squares, solve};
 use crate::motion::{Motion, State};
 use crate::robot::Robot;
+use crate::series::rms;
 
 /// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
 const DRIVE_COLUMNS: usize = 4;
@@ -462,44 +463,6 @@ fn powers(q: f64) -> [f64; SPRINGS] {
 pub fn sign_series(run: &Motion, joint: usize) -> Vec<f64> {
     let raw: Vec<f64> = (0..run.quick_velocity[joint].len()).map(|i| run.sign(joint, i)).collect();
     run.window.apply(&raw, 0)
-}
-
-/// Root of the mean square.
-pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
-    (sum / count.max(1) as f64).sqrt()
-}
-
-/// Standard deviation of what scatters about 0, from the median of its size (0.6745 of one): what is rare does not count. 0 of nothing.
-pub fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).map_or(0.0, |median| median / 0.6745)
-}
-
-/// Noise of a series, from how much it differs three rows apart, where these may be compared: half of them by less than noise gives, so that
-/// effects, which change slowly or seldom, do not count.
-pub fn noise_of(series: &[f64], comparable: impl Fn(usize, usize) -> bool) -> f64 {
-    let steps = (3..series.len()).filter(|&k| comparable(k - 3, k)).map(|k| series[k] - series[k - 3]);
-    robust_deviation(steps) / std::f64::consts::SQRT_2
-}
-
-/// Mean.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-/// Least and largest.
-pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-}
-
-/// A series less its mean over each run: where it stands in a run is not known.
-pub fn less_means(series: &[f64], run_of: impl Fn(usize) -> usize) -> Vec<f64> {
-    let runs = (0..series.len()).map(&run_of).max().map_or(0, |last| last + 1);
-    let means: Vec<f64> =
-        (0..runs).map(|r| mean(&(0..series.len()).filter(|k| run_of(*k) == r).map(|k| series[k]).collect::<Vec<_>>())).collect();
-    series.iter().enumerate().map(|(k, y)| y - means[run_of(k)]).collect()
 }
 
 #[cfg(test)]

@@ -2,12 +2,13 @@
 
 use gap_report::{BeforeAfter, HeatMap, HeatRun, Pictures, Quantity, Share, Signature};
 
-use crate::analysis::Found;
-use crate::held_out::{others, sized};
+use crate::cell::Channel;
+use crate::found::Found;
+use crate::held_out::{left, others, sized};
 use crate::hypothesis::Candidate;
-use crate::nominal::rms;
-use crate::problem::{Channel, Problem};
-use crate::verdicts::{cell_name, cell_quantity, cell_unit, held_out, left, main_cell, told};
+use crate::problem::Problem;
+use crate::series::rms;
+use crate::told::{cell_name, cell_quantity, cell_unit, main_cell, told};
 
 /// Width of a bin of the heat map, s.
 const BIN_S: f64 = 0.5;
@@ -148,7 +149,7 @@ fn signature(found: &Found, k: usize, cell: usize) -> Signature {
 /// Mean of the fitted effect over bins of the feature.
 fn curve(effect: &[(f64, f64)]) -> Vec<(f64, f64)> {
     const BINS: usize = 80;
-    let (low, high) = crate::nominal::range(effect.iter().map(|(x, _)| *x));
+    let (low, high) = crate::series::range(effect.iter().map(|(x, _)| *x));
     let width = (high - low).max(1e-300) / BINS as f64;
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
     for (x, y) in effect {
@@ -159,7 +160,7 @@ fn curve(effect: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 fn before_after(found: &Found, effect: u64, cell: usize) -> Option<BeforeAfter> {
-    let (c, before, after) = held_out(found, cell)?;
+    let (c, before, after) = found.before_and_after(cell)?;
     let of = &found.held.cells[c];
     // The first held-out run.
     let rows: Vec<usize> = (0..of.rows.len()).filter(|k| of.rows[*k].0 == 0).collect();

@@ -2,143 +2,14 @@
 
 use arm::serial::Workspace;
 
+use crate::cell::{Cell, Channel, zero_at};
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, Load, Nominal, noise_of, sign_series};
-use crate::nuisance::{Nuisance, believed, drifting};
+use crate::nominal::{Evaluator, Load, Nominal, sign_series};
+use crate::nuisance::Nuisance;
+use crate::pair::{Frames, Pair, held};
 use crate::robot::Robot;
+use crate::series::noise_of;
 use crate::shaking::Shaking;
-
-/// A residual space (gap-design.md, section 2).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Channel {
-    /// Torque at a joint.
-    JointTorque,
-    /// `A⁻¹ m - q` of a joint.
-    Transmission,
-    /// Tip in the base frame, one axis.
-    EndEffector,
-}
-
-/// One scalar residual over all runs.
-#[derive(Debug, Clone)]
-pub struct Cell {
-    /// Its space.
-    pub channel: Channel,
-    /// Joint or axis.
-    pub index: usize,
-    /// Run and sample of each row.
-    pub rows: Vec<(usize, usize)>,
-    /// Recording minus simulation, N·m, N, rad or m.
-    pub residual: Vec<f64>,
-    /// Places of the rows that say nothing, where residual and columns are 0: a drive is held by its friction, which takes
-    /// any force below its level, or elastic joints shake each other.
-    pub silent: Vec<usize>,
-}
-
-impl Cell {
-    /// Without rows.
-    pub(crate) fn new(channel: Channel, index: usize) -> Self {
-        Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new() }
-    }
-
-    /// Of each row, whether it says something.
-    pub(crate) fn says(&self) -> Vec<bool> {
-        let mut says = vec![true; self.rows.len()];
-        for &k in &self.silent {
-            says[k] = false;
-        }
-        says
-    }
-
-    /// RMS of a series over the rows that say something.
-    pub(crate) fn rms(&self, series: &[f64]) -> f64 {
-        crate::nominal::rms(series.iter().zip(self.says()).filter(|(_, says)| *says).map(|(y, _)| *y))
-    }
-
-    /// Makes a series 0 where the cell says nothing.
-    pub fn silence<T: Copy + Default>(&self, series: &mut [T]) {
-        zero_at(series, &self.silent);
-    }
-}
-
-fn zero_at<T: Copy + Default>(series: &mut [T], places: &[usize]) {
-    for &k in places {
-        series[k] = T::default();
-    }
-}
-
-/// Share of its RMS speed below which a drive is held, and for how long it has to be, s.
-const HELD: f64 = 0.01;
-const HELD_S: f64 = 0.1;
-/// How far from where it was held a drive has to be to be free, in s at its RMS speed: until then its friction keeps what it held.
-const FREE_S: f64 = 0.03;
-
-/// The samples at which a drive is held, with a margin for what smoothing carries over.
-pub(crate) fn held(motion: &Motion, drive: usize) -> Vec<bool> {
-    let speed = &motion.quick_velocity[drive];
-    let usual = crate::nominal::rms(speed.iter().copied());
-    let (least, margin) = ((HELD_S / motion.run.dt_s) as usize, (0.5 * HELD_S / motion.run.dt_s) as usize);
-    let mut held = vec![false; speed.len()];
-    let mut from = 0;
-    for i in 0..=speed.len() {
-        if i == speed.len() || speed[i].abs() > HELD * usual {
-            if i - from > least {
-                let free = i + speed[i..]
-                    .iter()
-                    .scan(0.0, |way, v| {
-                        *way += v * motion.run.dt_s;
-                        Some(*way)
-                    })
-                    .take_while(|way| way.abs() < FREE_S * usual)
-                    .count();
-                held[from.saturating_sub(margin)..(free + margin).min(speed.len())].fill(true);
-            }
-            from = i + 1;
-        }
-    }
-    held
-}
-
-/// Recording and simulation of one run on the same clock.
-#[derive(Debug, Clone)]
-pub struct Pair {
-    /// The recording.
-    pub real: Motion,
-    /// The simulation of the same commands.
-    pub sim: Option<Motion>,
-}
-
-impl Pair {
-    /// Both of one run. A frame of the recording's camera with none of the simulation's near is left out: some with what the simulation does and some
-    /// without are no one residual.
-    pub fn new(mut real: Motion, sim: Option<Motion>) -> Self {
-        if let Some(frames) = sim.as_ref().and_then(Frames::of) {
-            real.tip_rows.retain(|i| frames.around(*i).is_some());
-        }
-        Self { real, sim }
-    }
-}
-
-/// Samples, at most, between two frames between which a line is drawn.
-const FRAMES_APART: usize = 100;
-
-/// Samples with a measured tip.
-struct Frames(Vec<usize>);
-
-impl Frames {
-    fn of(motion: &Motion) -> Option<Self> {
-        let [x, ..] = motion.run.tip.as_ref()?;
-        Some(Self((0..x.len()).filter(|i| x[*i].is_finite()).collect()))
-    }
-
-    /// The frames before and after a sample, which are one where there is one at it.
-    fn around(&self, i: usize) -> Option<[usize; 2]> {
-        let after = self.0.partition_point(|frame| *frame < i);
-        let last = *self.0.get(after)?;
-        let first = if last == i { last } else { self.0[after.checked_sub(1)?] };
-        (last - first <= FRAMES_APART).then_some([first, last])
-    }
-}
 
 /// Least RMS of an effect in each cell: what is smaller may be the error of the nominal model. All 0 where that is not known.
 #[derive(Debug, Clone, Default)]
@@ -194,6 +65,8 @@ pub struct Problem<'a> {
 
 /// Times that an effect has to exceed what the nominal model leaves of the robot that it was learnt from.
 const BEYOND: f64 = 2.0;
+/// Share of what the model leaves of its own simulation's torque that may be left: of nulls of an arm that mostly stands a third is.
+const OF_ITS_OWN: f64 = 0.5;
 /// Does a joint move, in some run, so that its torque says more than where it hangs?
 fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
     pairs.iter().any(|pair| robot.moves(j, &pair.real.position[j]))
@@ -243,16 +116,6 @@ impl<'a> Problem<'a> {
         problem
     }
 
-    /// The same, its model learnt from another recording of the robot, whose friction and zero points are not those of today.
-    #[must_use]
-    pub fn learnt_from_recording(mut self) -> Self {
-        self.nuisances = drifting(&self);
-        self.silence_nuisances();
-        self = self.not_by_sample();
-        self.from_recording = true;
-        self
-    }
-
     /// The same, of simulations that move otherwise than the recording: what the model leaves of their own torques does not cancel.
     #[must_use]
     pub fn not_by_sample(mut self) -> Self {
@@ -263,12 +126,12 @@ impl<'a> Problem<'a> {
         self
     }
 
-    /// The same, its model believed but roughly: no simulation has shown what it stands for.
-    #[must_use]
-    pub fn believed_roughly(mut self) -> Self {
-        self.nuisances = believed(&self);
-        self.silence_nuisances();
-        self
+    /// What the model's error may leave of a cell, though it goes where recording and simulation move alike: each turns round when it does.
+    pub(crate) fn own_error(&self, c: usize) -> f64 {
+        match self.cells[c].channel {
+            Channel::JointTorque => OF_ITS_OWN * self.nominal.torque_error[self.cells[c].index],
+            _ => 0.0,
+        }
     }
 
     /// Are its rows points without a clock?
@@ -407,7 +270,7 @@ impl<'a> Problem<'a> {
             .collect();
     }
 
-    fn silence_nuisances(&mut self) {
+    pub(crate) fn silence_nuisances(&mut self) {
         for (cell, nuisance) in self.cells.iter().zip(&mut self.nuisances) {
             for column in &mut nuisance.columns {
                 cell.silence(column);

@@ -4,7 +4,7 @@
 use arm::serial::Workspace;
 use gap_report::Region;
 
-use crate::analysis::Found;
+use crate::found::Found;
 use crate::held_out::{others, sized};
 use crate::hypothesis::{ALWAYS, Windows};
 use crate::problem::Problem;
@@ -64,7 +64,7 @@ impl Space {
     fn of(found: &Found) -> Option<Self> {
         let tips = places(found.problem, &Self::Tip, &every_row(found.problem));
         let moves = |axis: usize| {
-            let (low, high) = crate::nominal::range(tips.iter().map(|tip| tip[axis]));
+            let (low, high) = crate::series::range(tips.iter().map(|tip| tip[axis]));
             high - low > MOVES_M
         };
         if (0..3).any(moves) {
@@ -119,7 +119,7 @@ fn rows(problem: &Problem, cell: usize, space: &Space, without: &[f64], own: &[f
 
 fn fitted(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<Rows> {
     let others = others(&sized(&found.answer.effects, found.estimates), effect);
-    let without = crate::verdicts::left(found.problem, cell, &others);
+    let without = crate::held_out::left(found.problem, cell, &others);
     let candidate = &found.answer.effects[effect].chosen.candidate;
     let own = candidate.effect(cell, &found.estimates[effect].coefficients);
     rows(found.problem, cell, space, &without, &own, candidate.windows.as_ref())
@@ -134,7 +134,7 @@ fn held_out(found: &Found, effect: usize, cell: usize, space: &Space) -> Option<
 
 /// The same, with how far the motion went where there is no limit.
 fn within_reach(limits: &Limits, all: [&Rows; 2]) -> Limits {
-    let reach = |axis: usize| crate::nominal::range(all.iter().flat_map(|rows| &rows.places).map(|place| place[axis]));
+    let reach = |axis: usize| crate::series::range(all.iter().flat_map(|rows| &rows.places).map(|place| place[axis]));
     let bounded = |&(axis, [low, high]): &(usize, [f64; 2])| {
         let (least, most) = reach(axis);
         (axis, [low.max(least), high.min(most)])

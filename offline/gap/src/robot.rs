@@ -3,7 +3,7 @@
 use arm::kinematics::Kinematics;
 use arm::serial::SerialArm;
 use nalgebra::DMatrix;
-use simulator::model::{Connection, RobotError, RobotModel};
+use simulator::model::{Bound, Connection, RobotError, RobotModel};
 
 /// What one drive is believed to be, on the joint's side of the gearbox.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ const STANDING_M: f64 = 0.001;
 impl Robot {
     /// Does a joint with these positions move?
     pub(crate) fn moves(&self, j: usize, position: &[f64]) -> bool {
-        let (low, high) = crate::nominal::range(position.iter().copied());
+        let (low, high) = crate::series::range(position.iter().copied());
         high - low > if self.prismatic[j] { STANDING_M } else { STANDING }
     }
 
@@ -133,7 +133,7 @@ impl Robot {
             drives: drives.collect(),
             columns: model.columns.iter().map(|c| (c.name.clone(), c.source.clone(), c.scale)).collect(),
             payload_sites: sites.collect(),
-            known: crate::known::effects(model),
+            known: effects_of(model),
             with_wrist: model.as_raven().map(|robot| robot.raven.arm(model.side()).kinematics.clone()),
             simulates_itself: false,
             motor_from_joint,
@@ -186,4 +186,14 @@ impl Robot {
     pub fn effort_unit(&self, joint: usize) -> &'static str {
         if self.prismatic[joint] { "N" } else { "N.m" }
     }
+}
+
+/// Physics and joints of the effects of a model, as families of hypotheses have them.
+pub(crate) fn effects_of(model: &RobotModel) -> Vec<(String, Vec<usize>)> {
+    let joints = |bound: Bound| match bound {
+        Bound::Joint(joint) | Bound::Motor(joint) | Bound::Link(joint) => vec![joint],
+        Bound::Pair(driven, driver) => vec![driven, driver],
+        Bound::Channel(_) | Bound::Robot => Vec::new(),
+    };
+    model.effects().iter().map(|effect| (effect.physics.name().to_owned(), joints(effect.bound))).collect()
 }

@@ -1,6 +1,6 @@
 //! Torques that stand at a limit: what an amplifier or a sensor cuts off is no torque that anything can be learnt from.
 
-use crate::nominal::range;
+use crate::series::range;
 
 /// Fewest samples in a row at the limit.
 const LEAST: usize = 4;

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::hypothesis::{Bound, Candidate, Column};
 use crate::linear;
 use crate::noise::{Noise, correlation_time};
-use crate::nominal::rms;
 use crate::nuisance::Projection;
 use crate::problem::Problem;
+use crate::series::rms;
 
 /// Whitened parts of columns: for each, its cells.
 type Parts = Vec<(usize, Vec<f64>)>;

@@ -7,10 +7,11 @@ mod likeliest;
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
+use crate::cell::Channel;
 use crate::hypothesis::{Candidate, Dictionary, Family, UNMODELLED, WALL, Windows, library, rounds};
 use crate::noise::Noise;
 use crate::parallel;
-use crate::problem::{Channel, Problem};
+use crate::problem::Problem;
 use crate::refine::{refined, starts};
 use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, segments, within_bounds};
@@ -281,7 +282,7 @@ impl Search<'_, '_> {
         let practical = self.problem.practical.of(family.physics, &family.joints);
         let beyond = |c: usize| {
             let told = scored.candidate.effect(c, theta);
-            !told.is_empty() && crate::nominal::rms(self.problem.nuisances[c].without(&told).into_iter()) >= practical[c]
+            !told.is_empty() && crate::series::rms(self.problem.nuisances[c].without(&told).into_iter()) >= practical[c]
         };
         let enough =
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));

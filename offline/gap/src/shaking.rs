@@ -2,9 +2,10 @@
 //! has its accelerations from the motors, says neither what their torques are nor what their cables bear.
 
 use crate::motion::Motion;
-use crate::nominal::{Load, Nominal, robust_deviation};
-use crate::problem::{Pair, held};
+use crate::nominal::{Load, Nominal};
+use crate::pair::{Pair, held};
 use crate::robot::Robot;
+use crate::series::robust_deviation;
 
 /// Times its usual size above which the nominal model does not hold for the simulation,
 const BEYOND: f64 = 10.0;

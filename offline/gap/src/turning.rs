@@ -2,8 +2,9 @@
 
 use crate::linear::least_squares;
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, Nominal, rms, sign_series};
+use crate::nominal::{Evaluator, Nominal, sign_series};
 use crate::robot::Robot;
+use crate::series::rms;
 
 /// Friction of one drive, joint units.
 #[derive(Debug, Clone, Copy, PartialEq)]

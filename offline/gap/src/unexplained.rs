@@ -3,13 +3,14 @@
 //! arm). It has no name, but it is no agreement either. Nor is what was found the whole of it where as much is left of its own place nearly
 //! all the time (an encoder that loses counts drifts, but by steps).
 
-use crate::held_out::Sized;
+use crate::cell::Channel;
+use crate::held_out::{Sized, left as left_by};
 use crate::hypothesis::UNMODELLED;
 use crate::noise::Noise;
-use crate::nominal::rms;
-use crate::problem::{Channel, Problem};
+use crate::problem::Problem;
 use crate::score::{segments, whiten};
-use crate::verdicts::{self, main_cell};
+use crate::series::rms;
+use crate::told::main_cell;
 
 /// Times the noise floor that is left where nothing was found. Robots without an effect stay near 1.
 const BEYOND: f64 = 3.0;
@@ -81,7 +82,7 @@ pub(crate) fn mostly(problem: &Problem, floors: &[f64], effects: &[Sized]) -> Op
     let exact = effects.iter().filter(|(claim, _)| is_exact(claim.family.physics));
     let cells = exact.map(|(claim, coefficients)| main_cell(floors, claim, coefficients));
     let of_cell = |cell: usize| {
-        let of = verdicts::left(problem, cell, effects);
+        let of = left_by(problem, cell, effects);
         let mut squares = vec![(0.0, 0); problem.block_count];
         for (y, &block) in of.iter().zip(&problem.blocks[cell]) {
             squares[block].0 += y * y;
@@ -129,7 +130,7 @@ fn strongest(problem: &Problem, c: usize) -> f64 {
 pub(crate) fn left(problem: &Problem, floors: &[f64]) -> Option<Unexplained> {
     let size = |c: usize| rms(problem.cells[c].residual.iter().copied());
     // What the model leaves of its own simulation is nothing that the robot has.
-    let above = |c: usize| size(c) / floors[c].max(problem.practical.any[c]).max(1e-300);
+    let above = |c: usize| size(c) / floors[c].max(problem.practical.any[c]).max(problem.own_error(c) / BEYOND).max(1e-300);
     let highest = |of: &dyn Fn(usize) -> f64, from: f64| {
         let heights = (0..problem.cells.len()).filter(|c| problem.cells[*c].channel != Channel::EndEffector).map(|c| (c, of(c)));
         heights.filter(|(_, height)| *height > from).max_by(|a, b| a.1.total_cmp(&b.1))

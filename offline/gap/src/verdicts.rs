@@ -3,71 +3,28 @@
 use std::time::{Instant, SystemTime};
 
 use gap_report::{
-    Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Experiment, Feature,
-    Fit as FitFigure, Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining,
-    Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict,
-    ranked, timestamp,
+    Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Feature, Fit as FitFigure,
+    Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining, Report, Role,
+    Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict, ranked,
+    timestamp,
 };
 
-use crate::analysis::{Found, Given, Options, Outcome, held_out_of};
+use crate::cell::Channel;
 use crate::controller::Changed;
 use crate::corrected::Corrected;
-use crate::held_out::{Refused, Sized, sized};
+use crate::found::{Found, Outcome};
+use crate::given::{Given, Options};
+use crate::held_out::Refused;
 use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window};
 use crate::intervals::{Edge, Estimate};
 use crate::pictures;
-use crate::problem::{Cell, Channel, Problem};
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
 use crate::search::{Effect, Scored, complexity, is_uneven, likelihood};
+use crate::split::held_out_of;
+use crate::told::{cell_name, cell_quantity, cell_unit, joints, main_cell, told};
 use crate::unexplained::{Pattern, Unexplained};
 use crate::{experiment, regime, region};
-
-/// The schema's name of a channel.
-pub(crate) fn told(channel: Channel) -> Told {
-    match channel {
-        Channel::JointTorque => Told::JointTorque,
-        Channel::Transmission => Told::Transmission,
-        Channel::EndEffector => Told::EndEffector,
-    }
-}
-
-/// Joint or axis of a cell, by name.
-pub(crate) fn cell_name(robot: &Robot, cell: &Cell) -> String {
-    match cell.channel {
-        Channel::EndEffector => ["x", "y", "z"][cell.index].to_owned(),
-        _ => robot.joints[cell.index].clone(),
-    }
-}
-
-/// Unit of a cell.
-pub(crate) fn cell_unit(robot: &Robot, cell: &Cell) -> &'static str {
-    match cell.channel {
-        Channel::JointTorque => robot.effort_unit(cell.index),
-        Channel::Transmission => robot.position_unit(cell.index),
-        Channel::EndEffector => "m",
-    }
-}
-
-/// What a cell shows, in words.
-pub(crate) fn cell_quantity(robot: &Robot, cell: &Cell) -> String {
-    let name = cell_name(robot, cell);
-    match cell.channel {
-        Channel::JointTorque => format!("torque of {name}"),
-        Channel::Transmission => format!("motor minus joint position of {name}"),
-        Channel::EndEffector => format!("tip position along {name}"),
-    }
-}
-
-/// The cell in which an effect stands highest above the noise.
-pub(crate) fn main_cell(floors: &[f64], candidate: &Candidate, theta: &[f64]) -> usize {
-    (0..floors.len())
-        .max_by(|a, b| {
-            let height = |c: usize| candidate.rms(c, theta) / floors[c].max(1e-300);
-            height(*a).total_cmp(&height(*b))
-        })
-        .unwrap_or(0)
-}
 
 /// A report of runs that are too few or too short.
 pub(crate) fn insufficient(
@@ -387,11 +344,6 @@ fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) ->
         .collect()
 }
 
-/// Names of the joints that an effect is told at.
-pub(crate) fn joints(robot: &Robot, candidate: &Candidate) -> Vec<String> {
-    candidate.family.joints.iter().map(|j| robot.joints[(*j).min(robot.joints.len() - 1)].clone()).collect()
-}
-
 /// Name and link of the site where a payload was found.
 fn site(found: &Found, candidate: &Candidate) -> Option<String> {
     if candidate.family.form != "at a site" {
@@ -454,27 +406,6 @@ fn interval(run: &Run, window: Window, known: Option<&[Option<Edge>; 2]>) -> Int
     told
 }
 
-/// Residuals of a cell of what was held out, before and after the correction by all effects.
-pub(crate) fn held_out(found: &Found, cell: usize) -> Option<(usize, Vec<f64>, Vec<f64>)> {
-    found.held_out().corrected(&sized(&found.answer.effects, found.estimates), &found.beside[cell], cell)
-}
-
-/// Likeliest values of what is known only roughly beside all effects, per cell.
-pub(crate) fn beside(problem: &Problem, effects: &[Effect], estimates: &[Estimate]) -> Vec<Vec<f64>> {
-    let all = sized(effects, estimates);
-    let left = |c: usize| left(problem, c, &all);
-    (0..problem.cells.len()).map(|c| problem.nuisances[c].estimate(&left(c))).collect()
-}
-
-/// What effects leave of the residual of a cell.
-pub(crate) fn left(problem: &Problem, c: usize, effects: &[Sized]) -> Vec<f64> {
-    let mut left = problem.cells[c].residual.clone();
-    for (candidate, coefficients) in effects {
-        candidate.take_off(c, coefficients, &mut left);
-    }
-    left
-}
-
 /// Ids of the held-out runs.
 fn held_ids(found: &Found) -> Vec<String> {
     found.held.pairs.iter().map(|pair| pair.real.run.id.clone()).collect()
@@ -483,7 +414,7 @@ fn held_ids(found: &Found) -> Vec<String> {
 fn fits(found: &Found, k: usize) -> Vec<FitFigure> {
     let cell = main_cell(found.floors, &found.answer.effects[k].chosen.candidate, &found.estimates[k].coefficients);
     let of = &found.problem.cells[cell];
-    let Some((c, before, after)) = held_out(found, cell) else { return Vec::new() };
+    let Some((c, before, after)) = found.before_and_after(cell) else { return Vec::new() };
     let there = &found.held.cells[c];
     let pair = (there.rms(&before), there.rms(&after));
     let floor = Some((found.floors[cell], found.floor_methods[cell]));
@@ -666,9 +597,4 @@ pub fn sha256_of(mut reader: impl std::io::Read) -> std::io::Result<String> {
         let _ = write!(text, "{byte:02x}");
         text
     }))
-}
-
-/// For signatures that need nothing else.
-pub(crate) fn experiment_of(goal: &str, rivals: Vec<Physics>, steps: &[&str]) -> Experiment {
-    Experiment::new(goal, rivals, steps.iter().map(|s| (*s).to_owned()).collect())
 }

@@ -2,7 +2,9 @@
 //! third of its main parameter, it is found out again.
 #![allow(missing_docs)]
 
-use gap::analysis::{Given, Options, Outcome, analyse};
+use gap::analysis::analyse;
+use gap::found::Outcome;
+use gap::given::{Given, Options};
 use gap_report::{Report, Role, Space, Status};
 use recordings::{Column, Recording};
 use simulator::Random;
@@ -177,6 +179,11 @@ fn a_wrong_coupling_is_fed_back() {
 #[test]
 fn dry_friction_is_fed_back() {
     found_out("coulomb_friction", "f_c", &fed_back("coulomb_friction", Bound::Joint(1), &[("f_c", 1.5)]));
+}
+
+#[test]
+fn a_ripple_is_fed_back() {
+    found_out("torque_ripple", "amp", &fed_back("torque_ripple", Bound::Joint(0), &[("amp", 1.0), ("order", 1.0), ("phase", 0.7)]));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{outcome, primary, report};
-use gap::analysis::Outcome;
+use gap::found::Outcome;
 use gap_report::Level;
 
 const REAL: &str = "raven2-uiuc/real_first_two_thirds.csv";

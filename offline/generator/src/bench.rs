@@ -1,10 +1,11 @@
 //! Brings an effect to the size that is asked for, by playing it with and without.
 
-use crate::draft::{Draft, Scene, draw};
+use crate::draft::draw;
 use crate::effect::{ALWAYS, Effect, NEVER};
 use crate::order::{Sealed, Wanted};
 use crate::random::Random;
 use crate::run::{Robot, Signals, play};
+use crate::scene::{Draft, Scene};
 use crate::sensors::record;
 use crate::severity::{Channel, ratio};
 use crate::trajectory::Trajectory;

@@ -2,12 +2,12 @@
 
 use crate::arm::DryLaw;
 use crate::bench::Bench;
-use crate::draft::Scene;
 use crate::effect::Effect;
 use crate::order::{Kind, Order, Sealed, Truth};
 use crate::random::Random;
 use crate::robots::{self, Pair};
 use crate::run::{Robot, Signals, play};
+use crate::scene::Scene;
 use crate::sensors::{Noise, record};
 use crate::trajectory::{self, Trajectory};
 use crate::{seal, table, urdf};

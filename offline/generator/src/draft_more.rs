@@ -1,10 +1,10 @@
 //! Drafts of the effects of motors, sensors and surroundings, and of those outside the library.
 
 use crate::arm::Motion;
-use crate::draft::{Draft, Growth, Scene, draft, place, times};
 use crate::effect::Effect;
 use crate::random::Random;
 use crate::run::Signals;
+use crate::scene::{Draft, Growth, Scene, draft, place, times};
 use crate::severity::{Channel, Place};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;

@@ -27,6 +27,7 @@ pub mod plant;
 pub mod random;
 pub mod robots;
 pub mod run;
+pub mod scene;
 pub mod seal;
 pub mod sensors;
 pub mod severity;

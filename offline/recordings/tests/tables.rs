@@ -80,6 +80,12 @@ fn a_few_cells_that_are_no_numbers_are_told_and_missing() {
         ["column `x_mm`: 1 cells are no numbers that can be kept (first in line 22: `2o.5`), taken as missing"]
     );
     assert_eq!(source.cells_lost(), 1);
+    // What says that it is missing is no damage, and a word where there are no numbers.
+    let marks: Vec<String> = (0..40).map(|row| format!("{row},{},None", if row % 2 == 0 { "NA" } else { "1.5" })).collect();
+    let mut source = table(&format!("t_s,x_mm,fault\n{}\n", marks.join("\n")));
+    let cells_of_marks = cells(&mut source);
+    assert_eq!((&cells_of_marks[1][0][..], &cells_of_marks[1][1][..], &cells_of_marks[2][0][..]), ("NaN", "1.5", "None"));
+    assert!(source.cells_lost() == 0 && source.findings().is_empty());
     // A number that no double holds is none; infinity in letters is one.
     rows[20] = "20,1e999".to_owned();
     rows[21] = "21,-inf".to_owned();

@@ -91,7 +91,7 @@ impl ToolAxes {
             let inertia = drive.nominal.inertia;
             let acceleration = |angle: f64, speed: f64| {
                 let (friction, slope) = friction(drive, speed, warm);
-                ((applied + drive.ripple(angle) - friction) / inertia, slope / inertia)
+                ((applied - drive.ripple(angle) - friction) / inertia, slope / inertia)
             };
             let (a1, slope) = acceleration(self.angles[i], self.speeds[i]);
             let damped = 1.0 + GAMMA * h * slope;

@@ -3,9 +3,9 @@
 use crate::camera::{Camera, Intrinsics};
 use crate::edge::Cone;
 use crate::error::{Error, Result};
+use crate::outcome::Tracked;
 use crate::pose::from_bearings;
 use crate::rig::Fixture;
-use crate::track::Tracked;
 use crate::triangulate::Bearing;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::path::Path;

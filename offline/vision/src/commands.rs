@@ -1,13 +1,15 @@
 //! What the command line does: folders and files in, files and results out.
 
-use crate::bundle::{self, Priors, UNKNOWN_BEARING_PX, reprojection_rms_px};
+use crate::adjustment::Priors;
+use crate::bundle::{self, UNKNOWN_BEARING_PX, reprojection_rms_px};
 use crate::cameras_file::{self, KnownCamera};
 use crate::error::{Error, Result};
 use crate::localise;
 use crate::marks::Contradiction;
+use crate::outcome::Tracked;
 use crate::rig::{self, Rig};
 use crate::table::read_picks;
-use crate::track::{self, Mode, Tracked};
+use crate::track::{self, Mode};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

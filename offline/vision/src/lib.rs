@@ -5,6 +5,7 @@
 #![deny(missing_docs)]
 
 pub mod accuracy;
+pub mod adjustment;
 pub mod associate;
 pub mod bundle;
 pub mod camera;

@@ -1,6 +1,6 @@
 //! How good marks and corners are by what an adjustment leaves of them, and which mark contradicts all others.
 
-use crate::bundle::Bundle;
+use crate::adjustment::Bundle;
 use crate::camera::Camera;
 use crate::least_squares::Minimum;
 use crate::localise::First;

@@ -4,11 +4,11 @@
 use crate::camera::Camera;
 use crate::edge::Cone;
 use crate::error::{Error, Result};
+use crate::outcome::{Row, Tracked};
 use crate::outcome::{Suspended, View};
 use crate::recording::Recording;
 use crate::rig::{Fixture, Rig};
 use crate::table::FrameTime;
-use crate::track::{Row, Tracked};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::RgbImage;

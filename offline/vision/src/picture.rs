@@ -1,7 +1,7 @@
 //! Images of a scene as planes of numbers.
 
 use crate::error::{Error, Result};
-use image::RgbImage;
+use image::{ImageError, RgbImage};
 use std::path::{Path, PathBuf};
 
 /// Endings that are looked for, in this order.
@@ -88,6 +88,12 @@ pub fn read(file: &Path, size_px: [u32; 2]) -> Result<RgbImage> {
     read_unless_damaged(file, size_px)?.map_err(|damage| no_image(file, damage))
 }
 
+/// Is there no end marker after the last scan of a JPEG? Cameras may pad behind it.
+fn is_jpeg_without_end(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    bytes.starts_with(&[0xff, 0xd8]) && last([0xff, 0xd9]) < last([0xff, 0xda])
+}
+
 fn no_image(file: &Path, what: String) -> Error {
     Error::content(file, "image", what, "give a JPEG or PNG")
 }
@@ -102,10 +108,14 @@ pub fn read_unless_damaged(file: &Path, size_px: [u32; 2]) -> Result<std::result
         Ok(image) => image.into_rgb8(),
         Err(error) => {
             let what = error.to_string().replace('\n', " ");
-            let was_one = bytes.is_empty() || image::guess_format(&bytes).is_ok();
-            return if was_one { Ok(Err(what)) } else { Err(no_image(file, what)) };
+            let is_cut = matches!(error, ImageError::Decoding(_) | ImageError::IoError(_)) && image::guess_format(&bytes).is_ok();
+            return if is_cut || bytes.is_empty() { Ok(Err(what)) } else { Err(no_image(file, what)) };
         }
     };
+    // The decoder fills with grey what a JPEG lacks.
+    if is_jpeg_without_end(&bytes) {
+        return Ok(Err("the JPEG has no end".to_owned()));
+    }
     if [image.width(), image.height()] != size_px {
         let what = format!("{} x {} px", image.width(), image.height());
         return Err(Error::content(file, "size", what, format!("rig.toml says {} x {}", size_px[0], size_px[1])));

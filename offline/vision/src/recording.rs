@@ -66,14 +66,22 @@ impl Recording {
         })
     }
 
-    /// Images spread over the recording, to learn colours from: at most `count` frames.
+    /// Images spread over the recording, to learn colours from: at most `count` frames, or the first that has any.
     ///
     /// # Errors
-    /// As [`Self::images`].
+    /// As [`Self::images`], and where no frame has one.
     pub fn sample(&self, count: usize) -> Result<Vec<RgbImage>> {
         let step = self.frames.len().div_ceil(count.max(1)).max(1);
         let mut all = Vec::new();
         for frame in self.frames.iter().step_by(step) {
+            all.extend(self.images(frame)?.into_iter().filter_map(|(image, _)| image));
+        }
+        let mut frames = self.frames.iter();
+        while all.is_empty() {
+            let Some(frame) = frames.next() else {
+                let what = "no image of any frame can be used";
+                return Err(Error::content(&self.folder, "images", what, "look at them: are they cut off, or black?"));
+            };
             all.extend(self.images(frame)?.into_iter().filter_map(|(image, _)| image));
         }
         Ok(all)

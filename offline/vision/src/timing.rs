@@ -1,9 +1,8 @@
 //! From where the end effector was in the middle of each exposure to where it was at the frame's time.
 
 use crate::exposure::{Exposure, RimWidth, estimate};
-use crate::outcome::View;
+use crate::outcome::{Found, Row, View};
 use crate::rig::Timing;
-use crate::track::{Found, Row};
 use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3};
 
 /// Frames whose rims are looked at; more say no more about one shutter.

@@ -5,13 +5,13 @@ use crate::colour;
 use crate::edge::Cone;
 use crate::error::{Error, Result};
 use crate::frame::Scene;
-use crate::outcome::{Lost, Measured, View};
+use crate::outcome::{Found, Lost, Measured, Row, Tracked, View};
 use crate::paper::{PaperFrame, PaperTracker};
 use crate::recording::Recording;
 use crate::rig::{Fixture, Rig};
 use crate::timing;
 use crate::update::Ledger;
-use nalgebra::{Isometry3, Matrix6, Point3};
+use nalgebra::Point3;
 use std::path::Path;
 
 /// How a recording is measured.
@@ -22,49 +22,6 @@ pub enum Mode {
     Default,
     /// Hough circles, midpoints, Nelder-Mead, as the paper.
     Paper,
-}
-
-/// A measured frame in either mode.
-#[derive(Debug, Clone)]
-pub struct Found {
-    /// Pose of the end effector.
-    pub pose: Isometry3<f64>,
-    /// Covariance of rotation vector (rad) and position (m); the paper has none.
-    pub covariance: Option<Matrix6<f64>>,
-    /// Balls in the order of the fixture (+x, +y, -x).
-    pub balls_m: [Point3<f64>; 3],
-    /// Cameras that count, per ball.
-    pub cameras: [usize; 3],
-    /// RMS distance between balls and fixture, m.
-    pub residual_m: f64,
-}
-
-/// A frame of the result.
-#[derive(Debug, Clone)]
-pub struct Row {
-    /// Number.
-    pub frame: u64,
-    /// Time.
-    pub t_s: f64,
-    /// What was measured, or why not.
-    pub found: std::result::Result<Found, Lost>,
-    /// Images that were missing or black.
-    pub remarks: Vec<String>,
-    /// Views by ball and camera; empty in paper mode and in lost frames. Rim points are kept of frames spread over the recording.
-    pub views: Vec<Vec<View>>,
-}
-
-/// A measured recording.
-#[derive(Debug)]
-pub struct Tracked {
-    /// One row per frame.
-    pub rows: Vec<Row>,
-    /// Colour names in the order of the fixture.
-    pub balls: [String; 3],
-    /// Exposure by which poses were moved back to the times of their frames, s.
-    pub exposure_s: Option<f64>,
-    /// When the rows' time is 0, s since 1970, where the recording says so.
-    pub start_unix_s: Option<f64>,
 }
 
 /// Places of the work space that outlines may have, m from the point all cameras look at.

@@ -109,11 +109,24 @@ fn a_file_that_is_no_image_is_named() {
 }
 
 #[test]
+fn a_recording_without_an_image_that_can_be_read_is_refused() {
+    let Some(own) = scene("empty", 2) else { return };
+    for camera in 0..4 {
+        for frame in 0..2 {
+            let path = own.0.join(format!("frames/cam{camera}/{frame:06}.jpg"));
+            std::fs::remove_file(&path).expect("image");
+            std::fs::write(&path, "").expect("file");
+        }
+    }
+    line(run(&own.0, Mode::Default), &["frames", "no image", "can be used"]);
+}
+
+#[test]
 fn an_image_that_was_cut_off_costs_its_camera_that_frame_alone() {
     let Some(own) = scene("cut", 3) else { return };
     let path = own.0.join("frames/cam2/000001.jpg");
     let whole = std::fs::read(&path).expect("image");
-    for kept in [0, 20] {
+    for kept in [0, 20, whole.len() / 4, whole.len() / 2, whole.len() - 3] {
         std::fs::remove_file(&path).expect("image");
         std::fs::write(&path, &whole[..kept]).expect("file");
         let tracked = run(&own.0, Mode::Default).expect("tracked");

@@ -5,7 +5,8 @@
 
 use super::{Wish, arms_of, differs, quietly, status, write};
 use crate::output;
-use ::gap::analysis::{Given, Options, Outcome};
+use ::gap::found::Outcome;
+use ::gap::given::{Given, Options};
 use ::gap::needed::keep_needed;
 use ::gap::verdicts::sha256;
 use ::gap::watch::{STEP_S, WINDOW_S};

@@ -1,9 +1,11 @@
 //! Recordings of the generator, altered: causes that it does not make, at times at which it does not begin them.
 
-use crate::common::{Case, case_of, holds, lines, made, named, near, primary, wanted, with_columns};
+use crate::common::{Case, case_of, holds, lines, made, named, near, primary, wanted, with_columns, written};
 use crate::program::{Folder, done, text};
 use arm::serial::Workspace;
 use gap_report::Status;
+use generator::order::Order;
+use generator::trajectory::Excitation;
 use simulator::RobotModel;
 
 /// Motor turns per turn of the elbow of the generator's arm, and per metre of its insertion.
@@ -23,6 +25,58 @@ fn column(path: &std::path::Path, name: &str) -> Vec<f64> {
 fn altered(folder: &Folder, case: &mut Case, change: impl Fn(usize, &str, usize, f64) -> f64) {
     for (k, path) in case.real.iter_mut().enumerate() {
         *path = with_columns(folder, &format!("altered-{k}.csv"), path, |column, row, value| Some(change(k, column, row, value)));
+    }
+}
+
+#[test]
+fn a_simulation_on_another_clock_is_set_back() {
+    // It passed for a late torque, a ripple, or friction that warms up.
+    let folder = Folder::new("clock");
+    let (mut case, _) = made(&folder, "null", &[], 12.0);
+    altered(&folder, &mut case, |_, column, _, value| if column == "t_s" { value + 0.02 } else { value });
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+    let clocks: Vec<_> = report.data_quality.iter().filter(|quality| quality.check == "same_clock").collect();
+    assert_eq!(clocks.len(), case.real.len());
+    assert!(clocks.iter().all(|quality| quality.message.contains("20.0 ms earlier")), "{}", clocks[0].message);
+}
+
+#[test]
+fn what_measures_in_another_unit_or_the_other_way_is_refused() {
+    // They passed for links a hand longer, zeros off by turns, and bases that are tilted.
+    type Change = fn(&str, f64) -> f64;
+    let folder = Folder::new("measured");
+    let changes: [(&str, Change); 4] = [
+        (
+            "tip position along x is",
+            |column, value| if column.starts_with("truth_") && column.ends_with("_mm") { value / 10.0 } else { value },
+        ),
+        ("tip position along y has", |column, value| if column == "truth_y_mm" { -value } else { value }),
+        (
+            "measured position of shoulder is",
+            |column, value| {
+                if column.starts_with("truth_jpos_1") { value.to_degrees() } else { value }
+            },
+        ),
+        ("measured position of elbow has", |column, value| if column.starts_with("truth_jpos_2") { -value } else { value }),
+    ];
+    for (words, change) in changes {
+        let (mut case, _) = made(&folder, "null", &[], 12.0);
+        altered(&folder, &mut case, |_, column, _, value| change(column, value));
+        let report = case.judged(&folder.file("out"));
+        assert_eq!(report.status, Status::InsufficientData, "{words}: {}", report.summary);
+        assert!(report.summary.contains(words), "{}", report.summary);
+    }
+}
+
+#[test]
+fn an_arm_that_mostly_stands_is_no_mismatch() {
+    // Where each turns round when it does something is left of its friction: three in four were told to lack something.
+    for seed in [8001, 8002, 8004, 8007] {
+        let folder = Folder::new("stands");
+        let order = Order { seed, label: "x".to_owned(), excitation: Excitation::Poor, seconds: 15.0, runs: 2, ..Order::default() };
+        let report = written(&folder, &order).0.judged(&folder.file("out"));
+        assert_eq!(report.status, Status::NoMismatch, "{seed}: {}", report.summary);
     }
 }
 

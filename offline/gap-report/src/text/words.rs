@@ -60,7 +60,8 @@ fn fits(report: &Report) -> Vec<String> {
 fn improvement(fit: &Fit) -> String {
     let metric = plain_metric(fit.metric);
     let floor = fit.noise_floor.map_or_else(String::new, |floor| format!(", noise alone {}", as_given(floor, &fit.unit)));
-    let gone = fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share)));
+    let gone =
+        fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share.min(1.0))));
     let (before, after) = (as_given(fit.before, &fit.unit), as_given(fit.after, &fit.unit));
     let space = if fit.space == Space::ClosedLoop { " in the loop" } else { "" };
     if fit.extra.get(ABSENT).is_some() {

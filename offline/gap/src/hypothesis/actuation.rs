@@ -2,7 +2,7 @@
 
 use super::dictionary::{Dictionary, size};
 use super::{Bound, Column, Family, product};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// Speed below which a joint creeps, of its RMS speed.
 const CREEPING: f64 = 0.01;
@@ -62,7 +62,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64> {
     dictionary.smoothed(|r| {
         let motion = &dictionary.problem.pairs[r].real;
-        let usual = crate::nominal::rms(motion.quick_velocity[j].iter().copied());
+        let usual = crate::series::rms(motion.quick_velocity[j].iter().copied());
         let moving = |v: &f64| f64::from(u8::from(v.abs() > CREEPING * usual));
         let wave = |motor: &Vec<Vec<f64>>| {
             motor[j].iter().zip(&motion.quick_velocity[j]).map(|(angle, v)| (order * angle + phase).sin() * moving(v)).collect()

@@ -6,9 +6,10 @@ use arm::serial::{PARAMETERS, SerialArm, Workspace};
 use nalgebra::DMatrix;
 
 use super::windows::Windows;
+use crate::cell::Channel;
 use crate::motion::{Motion, State};
 use crate::nominal::Evaluator;
-use crate::problem::{Channel, Problem};
+use crate::problem::Problem;
 
 /// One coefficient's part in every residual: `(cell, values)`, absent where it has none. The library is what fills the memory:
 /// values in single precision take half of it, and differ by less than any recording resolves; sums are made in double.
@@ -161,7 +162,7 @@ impl<'a> Dictionary<'a> {
     /// Distance between the ends of a joint's motion, rad or m.
     pub fn travel(&self, j: usize) -> f64 {
         let q = self.at_grid(|r, i, _| self.problem.pairs[r].real.position[j][i]);
-        let (low, high) = crate::nominal::range(q.iter().copied());
+        let (low, high) = crate::series::range(q.iter().copied());
         (high - low).max(1e-9)
     }
 
@@ -376,7 +377,7 @@ pub(super) fn minus(a: &[f64]) -> Vec<f64> {
 
 /// Root of the mean square of a series.
 pub(super) fn size(series: &[f64]) -> f64 {
-    crate::nominal::rms(series.iter().copied())
+    crate::series::rms(series.iter().copied())
 }
 
 /// Place of the row nearest to a sample; rows are missing where the recording has holes.

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Column, Family, product};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// Places of a wall, as shares of the travel along its normal.
 const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
@@ -35,7 +35,7 @@ impl Tips {
 
     /// How far the tip goes along a direction, m.
     fn range(&self, normal: &Vector3<f64>) -> (f64, f64) {
-        crate::nominal::range(self.positions.iter().map(|tip| tip.dot(normal)))
+        crate::series::range(self.positions.iter().map(|tip| tip.dot(normal)))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::dictionary::{Dictionary, size, times};
 use super::{Bound, Family, Valley, product};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
@@ -203,7 +203,7 @@ pub(super) fn heat(dictionary: &Dictionary, j: usize, shape: &[f64]) -> Vec<f64>
         let torque = problem.pairs[r].real.torque.as_ref().map_or(problem.loads[r][k].motor[j], |torque| torque[j][i]);
         torque * torque
     });
-    let mean = crate::nominal::mean(&squares).max(1e-30);
+    let mean = crate::series::mean(&squares).max(1e-30);
     let mut h = 0.0;
     dictionary
         .grid

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use super::dictionary::Dictionary;
 use super::{Bound, Family, product};
+use crate::cell::Channel;
 use crate::linear::dot;
-use crate::problem::{Channel, Pair};
+use crate::pair::Pair;
 
 const PHYSICS: &str = "cable_hysteresis";
 /// Bouc-Wen, the cable as stiff as in the simulation.

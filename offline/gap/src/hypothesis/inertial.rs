@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Rotation3, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Family};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// The form of a payload whose place is supposed, not asked of the data.
 pub(crate) const AT_THE_TIP: &str = "at the tip";

@@ -5,7 +5,7 @@ use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Column, Family};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 const TIP: Channel = Channel::EndEffector;
 /// Forms of a link that is turned, or moved, by itself or with the torque that its weight then asks for.

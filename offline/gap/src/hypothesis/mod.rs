@@ -28,7 +28,7 @@ pub(crate) use inertial::AT_THE_TIP;
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
 pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
 
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// What a coefficient may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -368,18 +368,18 @@ impl Candidate {
     /// RMS of the effect in a cell, about its mean where that is a constant of its own.
     pub fn varies_by(&self, cell: usize, coefficients: &[f64]) -> f64 {
         let effect = self.effect(cell, coefficients);
-        let mean = if self.family.with_constant { crate::nominal::mean(&effect) } else { 0.0 };
-        crate::nominal::rms(effect.into_iter().map(|x| x - mean))
+        let mean = if self.family.with_constant { crate::series::mean(&effect) } else { 0.0 };
+        crate::series::rms(effect.into_iter().map(|x| x - mean))
     }
 
     /// RMS of the effect in a cell for given coefficients.
     pub fn rms(&self, cell: usize, coefficients: &[f64]) -> f64 {
-        crate::nominal::rms(self.effect(cell, coefficients).into_iter())
+        crate::series::rms(self.effect(cell, coefficients).into_iter())
     }
 
     /// The same of the rows where it is.
     pub fn rms_where_it_is(&self, cell: usize, coefficients: &[f64]) -> f64 {
-        crate::nominal::rms(self.effect(cell, coefficients).into_iter().filter(|x| *x != 0.0))
+        crate::series::rms(self.effect(cell, coefficients).into_iter().filter(|x| *x != 0.0))
     }
 
     /// Of each block, whether it shows there.

@@ -2,8 +2,8 @@
 
 use super::dictionary::Dictionary;
 use super::{Bound, Column, Family};
+use crate::cell::Channel;
 use crate::nominal::sign_series;
-use crate::problem::Channel;
 
 /// Least delay of a torque, late or early, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
 const LEAST_LATE_S: f64 = 5e-4;

@@ -3,8 +3,9 @@
 use super::dictionary::{Dictionary, minus, size, times};
 use super::friction::{BEFORE, BEFORE_S, HEATING_S, heat};
 use super::{Bound, Column, Family, Valley, hysteresis, product};
+use crate::cell::Channel;
 use crate::motion::Motion;
-use crate::problem::{Channel, Pair};
+use crate::pair::Pair;
 use crate::run::Run;
 
 /// Widths of play, shares of a joint's travel.
@@ -249,7 +250,7 @@ fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f6
             let seen = dictionary.grid[row..]
                 .iter()
                 .take_while(|(other, at, _)| *other == r && (at - i) as f64 * motion.run.dt_s < AVERAGED * time_s);
-            let usual = crate::nominal::mean(&load[row..row + seen.count()]);
+            let usual = crate::series::mean(&load[row..row + seen.count()]);
             let left = (-motion.run.since_s / time_s).exp();
             (1.0 - left) * usual + left * settled * load[row]
         } else {

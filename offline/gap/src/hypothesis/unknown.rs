@@ -3,7 +3,7 @@
 
 use super::dictionary::{Dictionary, times};
 use super::{Bound, Family, geometric, product};
-use crate::problem::Channel;
+use crate::cell::Channel;
 
 /// Their name in the vocabulary.
 pub const UNMODELLED: &str = "unmodelled";

@@ -3,7 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use gap::analysis::{Given, Options, Outcome, analyse};
+use gap::analysis::analyse;
+use gap::found::Outcome;
+use gap::given::{Given, Options};
 use gap_report::{Report, Role, Verdict};
 use simulator::RobotModel;
 

@@ -6,7 +6,7 @@ use super::colour::{DENSITY_LEVELS, HEAT_LEVELS, STYLE};
 use super::layout::{self, LABEL_CHARACTERS, LINE, Layout, NAME_CHARACTERS, Place, shortened, text_width, titled, wrapped};
 use super::legend::colour_bar;
 use super::scale::{Axis, Ticks};
-use super::xml::{coordinate, escape, stroke};
+use super::xml::{coordinate, escape, stroke, text};
 use super::{Cells, Colour, Figure, Mark, Ramp};
 
 /// One figure, to be put into a page that has [`STYLE`]. It grows with the page; its height follows.
@@ -42,12 +42,6 @@ pub fn svg_document(figures: &[Figure]) -> String {
          <rect class=\"paper\" width=\"100%\" height=\"100%\"/>{parts}</svg>",
         *STYLE
     )
-}
-
-pub(super) fn text(out: &mut String, class: &str, anchor: &str, x: f64, y: f64, content: &str) {
-    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
-    let anchor = if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") };
-    let _ = write!(out, "<text{class}{anchor} x=\"{}\" y=\"{}\">{}</text>", coordinate(x), coordinate(y), escape(content));
 }
 
 /// The title of an axis, with the power of ten that its labels leave out.

@@ -4,10 +4,9 @@ use std::fmt::Write;
 
 use super::Cells;
 use super::colour::HEAT_LEVELS;
-use super::draw::text;
 use super::layout::{self, BAR, Layout, Place};
 use super::scale::ticks;
-use super::xml::coordinate;
+use super::xml::{coordinate, text};
 
 /// A bar beside a panel, from the least value to the greatest.
 pub(super) fn colour_bar(out: &mut String, layout: &Layout<'_>, place: &Place<'_>, cells: &Cells) {

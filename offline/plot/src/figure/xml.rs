@@ -56,6 +56,13 @@ pub(super) fn stroke(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     out
 }
 
+/// Appends a text element.
+pub(super) fn text(out: &mut String, class: &str, anchor: &str, x: f64, y: f64, content: &str) {
+    let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+    let anchor = if anchor == "start" { String::new() } else { format!(" text-anchor=\"{anchor}\"") };
+    let _ = write!(out, "<text{class}{anchor} x=\"{}\" y=\"{}\">{}</text>", coordinate(x), coordinate(y), escape(content));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -31,9 +31,15 @@ fn unchanged(cell: &str, value: f64) -> Option<f64> {
     (value.is_finite() || !cell.bytes().any(|byte| byte.is_ascii_digit())).then_some(value)
 }
 
+/// Is nothing in a cell, or one of the usual marks for that?
+fn is_missing(cell: &str) -> bool {
+    matches!(cell, "" | "NA" | "N/A" | "n/a" | "null" | "NULL" | "None" | "-")
+}
+
 /// Reads on as far as the probe goes; true for each column of words.
 pub(super) fn columns_of_words(lines: &mut Lines, columns: &[TableColumn]) -> Vec<bool> {
     let mut filled = vec![0_u64; columns.len()];
+    let mut marked = vec![0_u64; columns.len()];
     let mut words = vec![0_u64; columns.len()];
     let mut bytes = 0;
     while bytes < PROBE_BYTES && lines.advance().unwrap_or(false) {
@@ -46,12 +52,19 @@ pub(super) fn columns_of_words(lines: &mut Lines, columns: &[TableColumn]) -> Ve
         let Ok(row) = cells::row_text(lines) else { break };
         bytes += row.len();
         let Ok(split) = Split::of(row, columns.len()) else { break };
-        for ((cell, filled), words) in split.zip(&mut filled).zip(&mut words) {
-            *filled += u64::from(!cell.is_empty());
-            *words += u64::from(!cell.is_empty() && exact(&cell).is_none());
+        for (((cell, filled), words), marked) in split.zip(&mut filled).zip(&mut words).zip(&mut marked) {
+            let missing = is_missing(&cell);
+            *filled += u64::from(!missing);
+            *words += u64::from(!missing && exact(&cell).is_none());
+            *marked += u64::from(missing && !cell.is_empty());
         }
     }
-    filled.iter().zip(&words).map(|(filled, words)| *words > 0 && *words >= filled / WORDS_ONE_IN).collect()
+    // Marks of what is missing are words where there is nothing else.
+    let of_marks = |filled: u64, marked: u64| filled == 0 && marked > 0;
+    let is_text = |((filled, words), marked): ((&u64, &u64), &u64)| {
+        of_marks(*filled, *marked) || (*words > 0 && *words >= filled / WORDS_ONE_IN)
+    };
+    filled.iter().zip(&words).zip(&marked).map(is_text).collect()
 }
 
 /// Cells in columns of numbers that are none.
@@ -88,7 +101,7 @@ impl Kinds {
 
     /// The number in a cell; NaN for an empty one and for what is no number.
     pub(super) fn number(&mut self, place: usize, cell: &str) -> f64 {
-        if cell.is_empty() {
+        if is_missing(cell) {
             return f64::NAN;
         }
         if let Some(value) = exact(cell) {

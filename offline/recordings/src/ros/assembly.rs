@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use arm::{JOINTS, Side};
 
-use super::bytes::{Header, MessageError};
+use super::bytes::{Header, METADATA_MAX, MessageError};
 use super::definitions::{COMPRESSED_IMAGE, JOINT_STATE, KEY_VALUE, MessageType, POSE_STAMPED, RAVEN_STATE, STATE_ORIGIN};
 use super::emission::{METADATA_TOPIC, camera_topic, truth_topic};
 use super::layout::{DefinitionError, Layout};
@@ -17,8 +17,6 @@ const EXTERNAL_JOINTS: &str = "/ext_jpos";
 /// Joints that those measure.
 const EXTERNAL_COUNT: usize = 3;
 
-/// Most that the pairs of a file may take up, bytes.
-pub(super) const METADATA_MAX: usize = 16 << 20;
 /// What a pair takes up beside its text.
 const PAIR_BYTES: usize = 2 * size_of::<String>();
 

@@ -1,6 +1,7 @@
 //! Reading and writing the little-endian values of a ROS 1 message.
 
-use super::assembly::METADATA_MAX;
+/// Most that the pairs of a file may take up, bytes.
+pub(super) const METADATA_MAX: usize = 16 << 20;
 
 /// Why the bytes of a message do not fit its definition.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

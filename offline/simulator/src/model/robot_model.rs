@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::error::syntax;
 use super::{
     ControllerModel, DriveModel, Effect, MappedColumn, ModelError, Robot, RobotError, UrdfRobot, columns, model_error, raven,
-    raven_file, save, urdf_file,
+    raven_file, urdf_file,
 };
 use crate::plant::{Passive, Plant, PlantError};
 use crate::{any_arm, robot_plant};
@@ -286,23 +286,5 @@ impl RobotModel {
             Kind::Raven(robot) => Ok(robot_plant::build(robot, self.side, &[0.0; arm::JOINTS])?.0),
             Kind::Urdf(robot) => any_arm::build(robot, &[0.0; crate::plant::JOINTS_MAX]),
         }
-    }
-
-    /// The robot as a file that stands for itself: a URDF is in it.
-    pub fn to_toml(&self) -> String {
-        save::text(self)
-    }
-
-    /// Writes [`Self::to_toml`] to a file, whole or not at all.
-    ///
-    /// # Errors
-    /// [`RobotError::File`].
-    pub fn save(&self, path: &Path) -> Result<(), RobotError> {
-        let failed = |error: std::io::Error| RobotError::File { what: format!("{}: cannot be written: {error}", path.display()) };
-        let aside = path.with_extension(format!("{}.new", std::process::id()));
-        std::fs::write(&aside, self.to_toml()).and_then(|()| std::fs::rename(&aside, path)).map_err(|error| {
-            drop(std::fs::remove_file(&aside));
-            failed(error)
-        })
     }
 }

@@ -1,17 +1,38 @@
 //! Robots as text: what [`RobotModel::from_toml`] reads as the same robot again.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use super::controller_model::GAINS;
 use super::effect::{Bound, Effect};
 use super::fields::FIELDS;
 use super::robot_model::Kind;
 use super::urdf_robot::STEP_S;
-use super::{Connection, ControllerModel, Robot, RobotModel, UrdfRobot};
+use super::{Connection, ControllerModel, Robot, RobotError, RobotModel, UrdfRobot};
 use crate::physics::{Channel, Value};
 use crate::plant::Passive;
 
-pub(super) fn text(model: &RobotModel) -> String {
+impl RobotModel {
+    /// The robot as a file that stands for itself: a URDF is in it.
+    pub fn to_toml(&self) -> String {
+        text(self)
+    }
+
+    /// Writes [`Self::to_toml`] to a file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`RobotError::File`].
+    pub fn save(&self, path: &Path) -> Result<(), RobotError> {
+        let failed = |error: std::io::Error| RobotError::File { what: format!("{}: cannot be written: {error}", path.display()) };
+        let aside = path.with_extension(format!("{}.new", std::process::id()));
+        std::fs::write(&aside, self.to_toml()).and_then(|()| std::fs::rename(&aside, path)).map_err(|error| {
+            drop(std::fs::remove_file(&aside));
+            failed(error)
+        })
+    }
+}
+
+fn text(model: &RobotModel) -> String {
     let mut out = String::from("schema = \"ravenpose-robot/1\"\n");
     let _ = writeln!(out, "name = {}", quoted(model.name()));
     match &model.kind {

@@ -1,8 +1,8 @@
-//! `torque_ripple`: the motor pulls unevenly over its turn.
+//! `torque_ripple`: the motor loses torque unevenly over its turn.
 
 use super::parameters::{ANY, POSITIVE, Parameter, ParameterError, Parameters};
 
-/// `tau = amp sin(order theta_m + phase)`, `theta_m` the angle of the motor's shaft.
+/// `tau = amp sin(order theta_m + phase)` is lost, as friction is: so much more has to be commanded. `theta_m` is the angle of the motor's shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueRipple {
     /// Amplitude on the joint's side, N·m or N.
@@ -30,7 +30,7 @@ impl TorqueRipple {
         Ok(Self { amplitude, order, phase })
     }
 
-    /// What is added to the torque at a motor angle, N·m or N on the joint's side.
+    /// What is lost of the torque at a motor angle, N·m or N on the joint's side.
     #[inline]
     pub fn torque(&self, motor_rad: f64) -> f64 {
         self.amplitude * (self.order * motor_rad + self.phase).sin()

@@ -8,32 +8,7 @@ use crate::physics::{
 use super::DriveNumbers;
 use super::dragged::Held;
 use super::rub::Rub;
-
-/// An effect and the time in which it acts.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Timed<T> {
-    pub(crate) effect: T,
-    pub(crate) from_s: f64,
-    pub(crate) to_s: f64,
-    pub(crate) on: bool,
-}
-
-impl<T> Timed<T> {
-    pub(crate) fn new(effect: T, from_s: f64, to_s: f64) -> Self {
-        Self { effect, from_s, to_s, on: from_s <= 0.0 }
-    }
-
-    /// Returns whether it was switched.
-    pub(crate) fn at(&mut self, time_s: f64) -> bool {
-        let before = std::mem::replace(&mut self.on, (self.from_s..self.to_s).contains(&time_s));
-        before != self.on
-    }
-}
-
-/// Effects that act now.
-pub(crate) fn on<T>(effects: &[Timed<T>]) -> impl Iterator<Item = &T> {
-    effects.iter().filter(|timed| timed.on).map(|timed| &timed.effect)
-}
+use super::timed::{Timed, on};
 
 /// Nominal numbers and all effects of one drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -312,7 +287,7 @@ impl Drive {
         on(&self.scale).fold(commanded_nm, |torque, amplifier| amplifier.torque(torque, self.nominal.torque_per_count_nm))
     }
 
-    /// Ripple at a motor angle, N·m at the capstan.
+    /// What ripple takes off at a motor angle, N·m at the capstan.
     #[inline]
     pub(crate) fn ripple(&self, motor_rad: f64) -> f64 {
         let joint_side: f64 = on(&self.ripple).map(|ripple| ripple.torque(motor_rad)).sum();

@@ -149,7 +149,7 @@ impl Plant {
                     applied_nm[i] - motor_friction - drive.drag(&state.memories) - nominal.gear / nominal.ratio * reaction[i];
                 drive.drag_rates(state.speeds[i], &state.memories, &mut out.memory_rates);
                 if !drive.ripple.is_empty() {
-                    out.motor[i] += drive.ripple(state.motors[i]);
+                    out.motor[i] -= drive.ripple(state.motors[i]);
                 }
                 out.motor_slope[i] = motor_slope;
             }
@@ -230,7 +230,7 @@ impl Plant {
         for i in 0..n {
             joints[i] = evaluation.drive[i] - evaluation.bias[i];
         }
-        super::step::solve_mass(&evaluation.mass, n, &mut joints);
+        super::solve::solve_mass(&evaluation.mass, n, &mut joints);
         let mut motors = [0.0; JOINTS_MAX];
         for i in 0..n {
             motors[i] = evaluation.motor[i] / self.drives[i].nominal.inertia;

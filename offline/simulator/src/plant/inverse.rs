@@ -196,7 +196,7 @@ impl Plant {
             let (friction, _) = drive.motor_friction(motors[1][i], drive.warm_share(&memory.memories));
             let held = friction + drive.drag(&memory.memories);
             let acts = nominal.inertia * motors[2][i] + held + nominal.gear / nominal.ratio * reaction[i];
-            needed.torque[i] = drive.commanded(acts - drive.ripple(motors[0][i]));
+            needed.torque[i] = drive.commanded(acts + drive.ripple(motors[0][i]));
         }
     }
 

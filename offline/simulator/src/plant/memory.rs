@@ -1,6 +1,7 @@
 //! What a drive remembers: hysteresis, creep, warmth.
 
-use super::drive::{Drive, in_series, on};
+use super::drive::{Drive, in_series};
+use super::timed::on;
 
 impl Drive {
     /// Rates of the memories of this drive, given the torque that the cable transmits.

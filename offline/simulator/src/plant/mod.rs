@@ -6,6 +6,7 @@
 //! A rigid drive has no deflection: its motor is part of the link (`rigid.rs`).
 
 mod cable;
+mod drag;
 mod dragged;
 mod drive;
 mod evaluate;
@@ -16,7 +17,9 @@ mod rates;
 mod rest;
 mod rigid;
 mod rub;
+mod solve;
 mod step;
+mod timed;
 
 use arm::serial::{SerialArm, Workspace};
 use nalgebra::Vector3;
@@ -24,10 +27,11 @@ use nalgebra::Vector3;
 pub use cable::{CableForce, CableLaw};
 pub use dragged::Dragged;
 pub(crate) use dragged::Held;
-pub(crate) use drive::{Drive, Stiction, Timed, on};
+pub(crate) use drive::{Drive, Stiction};
 pub use inverse::{Given, Memory, Needed};
 pub use numbers::{Between, DriveNumbers, Passive, Rubbing};
 pub use step::Method;
+pub(crate) use timed::{Timed, on};
 
 use crate::physics::{ExternalContact, GravityDirection, JointCoupling, JointOffset, LinkInertia, Payload};
 

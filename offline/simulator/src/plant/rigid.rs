@@ -58,7 +58,7 @@ impl Plant {
             let (friction, friction_slope) = drive.motor_friction(turned(&state.rates), drive.warm_share(&state.memories));
             let mut torque = applied_nm[i] - friction;
             if !drive.ripple.is_empty() {
-                torque += drive.ripple(turned(&state.joints));
+                torque -= drive.ripple(turned(&state.joints));
             }
             for j in 0..self.joints {
                 push[j] += row[j] * reach * torque;

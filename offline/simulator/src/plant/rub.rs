@@ -4,7 +4,7 @@ use crate::model::Effect;
 use crate::physics::{CoulombFriction, Physics, StribeckFriction, ViscousFriction};
 
 use super::Drive;
-use super::drive::Timed;
+use super::timed::Timed;
 
 /// Friction that a motor can have beyond its nominal one.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 use vision::accuracy::{Accuracy, compare, read_truth};
 use vision::commands;
-use vision::track::{Mode, Tracked};
+use vision::outcome::Tracked;
+use vision::track::Mode;
 
 /// A folder of test data, or plain words that it is absent.
 pub(crate) fn data(name: &str) -> Option<PathBuf> {
