@@ -148,7 +148,14 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
         let message = format!("more than half of the cells of {name} are empty: this channel is not looked at");
         DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
     });
-    masked.into_iter().chain(left_out).collect()
+    let at_zero = (run.at_zero > 0).then(|| {
+        let message = format!(
+            "{} positions of the tip are 0, 0, 0 to the last digit, as some trackers write a frame that they lost: taken as none; leave such cells empty",
+            run.at_zero
+        );
+        DataQuality::new("gaps", Level::Warn, message).run(run.id.clone()).value(run.at_zero as f64, "1")
+    });
+    masked.into_iter().chain(left_out).chain(at_zero).collect()
 }
 
 /// Torques that stand at a limit.

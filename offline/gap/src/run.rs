@@ -46,6 +46,8 @@ pub struct Run {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
     pub tip: Option<[Vec<f64>; 3]>,
+    /// Rows in which the tip stood at 0, 0, 0 to the last digit, which are taken for frames that were lost.
+    pub at_zero: usize,
     /// Samples that were not recorded, in which the series are bridged, or in which a torque stands at its limit: nothing may be concluded
     /// from them.
     pub mask: Vec<bool>,
@@ -120,9 +122,10 @@ impl Run {
             let (_, source, scale) = robot.columns.iter().find(|(own, ..)| own == name)?;
             recording.column(source).map(|column| column.iter().map(|x| x * scale).collect::<Vec<f64>>())
         };
+        let column = |name: &str| mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec));
         // A column without a single value is not there.
         let series = |name: &str| {
-            let column = mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec))?;
+            let column = column(name)?;
             column.iter().any(|x| x.is_finite()).then(|| clock.resample(&time, &column))
         };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
@@ -189,10 +192,13 @@ impl Run {
             (None, Some(joints)) => Some(see(joints)),
             (None, None) => counted().map(|motors| at_joints(see(motors))),
         };
-        let tip = ["x", "y", "z"].map(|axis| series(&format!("truth_{axis}_m")));
-        let mut tip = match tip {
-            [Some(x), Some(y), Some(z)] => Some([x, y, z]),
-            _ => None,
+        let (mut tip, at_zero) = match ["x", "y", "z"].map(|axis| column(&format!("truth_{axis}_m"))) {
+            [Some(x), Some(y), Some(z)] => {
+                let (tip, at_zero) = without_zeros([x, y, z]);
+                let seen = tip.iter().all(|axis| axis.iter().any(|x| x.is_finite()));
+                (seen.then(|| tip.map(|axis| clock.resample(&time, &axis))), at_zero)
+            }
+            _ => (None, 0),
         };
         let truth = all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
             format!("q_act_{}_{}", j + 1, unit(j))
@@ -218,6 +224,7 @@ impl Run {
             command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
+            at_zero,
             left_out: Vec::new(),
             saturated: limited.0,
         };
@@ -345,6 +352,7 @@ impl Run {
             command: self.command.as_ref().map(set),
             motor: self.motor.as_ref().map(set),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(series)),
+            at_zero: self.at_zero,
             mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
             left_out: self.left_out.clone(),
             saturated: self.saturated.clone(),
@@ -369,6 +377,7 @@ impl Run {
             command: self.command.as_ref().map(cut),
             motor: self.motor.as_ref().map(cut),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
+            at_zero: self.at_zero,
             mask: self.mask[from..to].to_vec(),
             left_out: self.left_out.clone(),
             saturated: self.saturated.clone(),
@@ -502,6 +511,26 @@ pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
     Ok((real, sim))
 }
 
+/// Share of its usual distance from the origin that a tip never comes nearer to it, where 0, 0, 0 is no place but a frame that was lost.
+const NEVER_NEARER: f64 = 0.1;
+
+/// A tip without what some trackers write where they lost it, and in how many rows they did.
+fn without_zeros(mut tip: [Vec<f64>; 3]) -> ([Vec<f64>; 3], usize) {
+    let distance = |i: usize| tip.iter().map(|axis| axis[i].powi(2)).sum::<f64>().sqrt();
+    let (zero, elsewhere): (Vec<usize>, Vec<usize>) =
+        (0..tip[0].len()).filter(|i| distance(*i).is_finite()).partition(|i| distance(*i) == 0.0);
+    let usual = rms(elsewhere.iter().map(|i| distance(*i)));
+    if elsewhere.iter().any(|i| distance(*i) < NEVER_NEARER * usual) {
+        return (tip, 0);
+    }
+    for axis in &mut tip {
+        for i in &zero {
+            axis[*i] = f64::NAN;
+        }
+    }
+    (tip, zero.len())
+}
+
 /// Takes off a tip what the wrist moves it by, wherever there is one.
 fn straighten(robot: &Robot, tip: &mut [Vec<f64>; 3], joints: &[Vec<f64>], wrist: &[Vec<f64>]) {
     let (Ok(joints), Ok(wrist)) = (<&[Vec<f64>; 3]>::try_from(joints), <&[Vec<f64>; 4]>::try_from(wrist)) else { return };
@@ -560,6 +589,7 @@ impl Run {
             command: None,
             motor: None,
             tip: None,
+            at_zero: 0,
             mask: vec![false; series.len()],
             left_out: Vec::new(),
             saturated: Vec::new(),

@@ -17,7 +17,7 @@ pub(super) fn all(files: &[PathBuf], model: &RobotModel, arm: &str) -> Result<(V
         if of_this != ExitCode::SUCCESS {
             status = of_this;
         }
-        let run = Run::from_recording(&recording, model).map_err(|error| error.to_string())?;
+        let run = Run::from_recording(&model.mapped(recording), model).map_err(|error| error.to_string())?;
         Commands::of_run(model, &run).map_err(|error| error.to_string())?;
         runs.push(run);
     }

@@ -42,6 +42,19 @@ fn a_simulation_on_another_clock_is_set_back() {
 }
 
 #[test]
+fn frames_that_a_tracker_lost_as_zeros_are_no_link_that_is_longer() {
+    let folder = Folder::new("zeros");
+    let (mut case, _) = made(&folder, "null", &[], 12.0);
+    altered(&folder, &mut case, |_, column, row, value| {
+        let is_tip = ["truth_x_mm", "truth_y_mm", "truth_z_mm"].contains(&column);
+        if is_tip && row % 400 < 40 { 0.0 } else { value }
+    });
+    let report = case.judged(&folder.file("out"));
+    assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
+    assert!(report.data_quality.iter().any(|quality| quality.message.contains("0, 0, 0 to the last digit")));
+}
+
+#[test]
 fn what_measures_in_another_unit_or_the_other_way_is_refused() {
     // They passed for links a hand longer, zeros off by turns, and bases that are tilted.
     type Change = fn(&str, f64) -> f64;

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use recordings::{Column, Recording};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::RobotError;
 use super::error::{line_of, syntax};
 use super::tables::value;
+use super::{RobotError, RobotModel};
 
 /// A column of a recording that stands for one of tidy CSV.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,22 @@ pub struct MappedColumn {
     pub source: String,
     /// What its values are multiplied by.
     pub scale: f64,
+}
+
+impl RobotModel {
+    /// A recording with the columns that the robot's file maps, under their own names; those that it has already stay.
+    #[must_use]
+    pub fn mapped(&self, mut recording: Recording) -> Recording {
+        for MappedColumn { name, source, scale } in &self.columns {
+            if recording.column(name).is_none()
+                && let Some(values) = recording.column(source)
+            {
+                let values = values.iter().map(|value| value * scale).collect();
+                recording.columns.push(Column::new(name.clone(), values));
+            }
+        }
+        recording
+    }
 }
 
 #[derive(Deserialize)]
