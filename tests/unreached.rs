@@ -2,25 +2,16 @@
 //! descriptors away.
 
 mod common;
+#[path = "common/descriptors.rs"]
+mod descriptors;
 #[path = "common/service.rs"]
 mod service;
 
+use descriptors::limit_descriptors;
 use ravenpose_transport::Writer;
 use ravenpose_wire::RavenState;
 use service::{CONFIG, World};
 use std::time::Duration;
-
-/// Sets how many descriptors this process may have; how many it had.
-fn limit_descriptors(most: libc::rlim_t) -> libc::rlim_t {
-    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: valid pointers.
-    unsafe {
-        assert_eq!(libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit), 0);
-        let before = std::mem::replace(&mut limit.rlim_cur, most);
-        assert_eq!(libc::setrlimit(libc::RLIMIT_NOFILE, &raw const limit), 0);
-        before
-    }
-}
 
 #[test]
 fn a_service_that_a_controller_could_not_connect_opens_another_reader() {

@@ -2,24 +2,15 @@
 
 #[path = "../../tests/common/mod.rs"]
 mod common;
+#[path = "../../tests/common/descriptors.rs"]
+mod descriptors;
 
+use descriptors::limit_descriptors;
 use ravenpose_bridge::*;
 use ravenpose_transport::{Reader, Settings};
 use ravenpose_wire::RavenState;
 use std::ffi::CString;
 use std::ptr::null_mut;
-
-/// Sets how many descriptors this process may have; how many it had.
-fn limit_descriptors(most: libc::rlim_t) -> libc::rlim_t {
-    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
-    // SAFETY: valid pointers.
-    unsafe {
-        assert_eq!(libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit), 0);
-        let before = std::mem::replace(&mut limit.rlim_cur, most);
-        assert_eq!(libc::setrlimit(libc::RLIMIT_NOFILE, &raw const limit), 0);
-        before
-    }
-}
 
 #[test]
 fn a_reader_that_cannot_be_connected_is_told_once_and_the_others_have_the_state() {
