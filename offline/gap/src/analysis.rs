@@ -364,6 +364,9 @@ fn analyse_with(
     let (floors, floor_methods): (Vec<f64>, Vec<FloorMethod>) = floors::floors(&problem).into_iter().unzip();
     // What the model gets wrong itself, and the forms of its own effects do, is no further effect.
     known::put_on(&mut problem, model, given, band);
+    if robot.simulates_itself {
+        problem.beyond_the_cycle();
+    }
     let dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");

@@ -8,7 +8,7 @@ use crate::nominal::{Evaluator, Load, Nominal, sign_series};
 use crate::nuisance::Nuisance;
 use crate::pair::{Frames, Pair, held};
 use crate::robot::Robot;
-use crate::series::noise_of;
+use crate::series::{noise_of, rms};
 use crate::shaking::Shaking;
 
 /// Least RMS of an effect in each cell: what is smaller may be the error of the nominal model. All 0 where that is not known.
@@ -65,6 +65,8 @@ pub struct Problem<'a> {
 
 /// Times that an effect has to exceed what the nominal model leaves of the robot that it was learnt from.
 const BEYOND: f64 = 2.0;
+/// Share of a torque that half a control cycle makes, a millisecond of motions that take half a second, and as much again.
+const WITHIN_A_CYCLE: f64 = 2e-3;
 /// Share of what the model leaves of its own simulation's torque that may be left: of nulls of an arm that mostly stands a third is.
 const OF_ITS_OWN: f64 = 0.5;
 /// Does a joint move, in some run, so that its torque says more than where it hangs?
@@ -124,6 +126,17 @@ impl<'a> Problem<'a> {
         self.practical.any = self.cells.iter().map(of).collect();
         self.practical.known.clone_from(&self.practical.any);
         self
+    }
+
+    /// Of a robot that its own model stands in for: an effect has to be more than when, within a control cycle, a torque acts that is written with it.
+    pub(crate) fn beyond_the_cycle(&mut self) {
+        for c in 0..self.cells.len() {
+            let Cell { channel: Channel::JointTorque, index, rows, .. } = &self.cells[c] else { continue };
+            let at = |(r, i): (usize, usize)| self.pairs[r].real.torque.as_ref().map_or(0.0, |torque| torque[*index][i]);
+            let least = WITHIN_A_CYCLE * rms(rows.iter().map(|row| at(*row)));
+            self.practical.any[c] = self.practical.any[c].max(least);
+            self.practical.known[c] = self.practical.known[c].max(least);
+        }
     }
 
     /// What the model's error may leave of a cell, though it goes where recording and simulation move alike: each turns round when it does.

@@ -52,10 +52,16 @@ const FEW: usize = 2;
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
 const TIP_RESOLUTION: f64 = 2e-6;
+/// No encoder tells less than this of a joint (rad or m RMS); a simulation without noise does.
+const JOINT_RESOLUTION: f64 = 1e-7;
 
 /// Least RMS of an effect in a channel, in its unit.
 fn resolution(channel: Channel) -> f64 {
-    if channel == Channel::EndEffector { TIP_RESOLUTION } else { 0.0 }
+    match channel {
+        Channel::EndEffector => TIP_RESOLUTION,
+        Channel::Transmission => JOINT_RESOLUTION,
+        Channel::JointTorque => 0.0,
+    }
 }
 
 /// Claims that are tried in windows.

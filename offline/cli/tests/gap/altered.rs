@@ -29,6 +29,20 @@ fn altered(folder: &Folder, case: &mut Case, change: impl Fn(usize, &str, usize,
 }
 
 #[test]
+fn an_arm_is_no_other_than_its_own_simulation() {
+    // Its torque is written half a control cycle before it acts on the average, and without noise a billionth of a radian stands high above it.
+    let folder = Folder::new("itself");
+    let (case, _) = made(&folder, "null", &[], 12.0);
+    for seed in ["1", "2", "3"] {
+        let (runs, out) = (folder.file(&format!("runs-{seed}")), folder.file("out"));
+        let plan = ["--minutes", "0.8", "--run-minutes", "0.4", "--seed", seed, "--out", text(&runs)];
+        done(&[&["simulate", "--robot", text(&case.robot)][..], &plan].concat());
+        let [first, second] = ["run_0001.csv", "run_0002.csv"].map(|name| runs.join(name));
+        done(&["gap", "--real", text(&first), text(&second), "--robot", text(&case.robot), "--out", text(&out)]);
+    }
+}
+
+#[test]
 fn a_simulation_on_another_clock_is_set_back() {
     // It passed for a late torque, a ripple, or friction that warms up.
     let folder = Folder::new("clock");
