@@ -75,7 +75,8 @@ pub enum AnalysisError {
 fn another_clock(one: &Given, lag_s: f64) -> DataQuality {
     let (ms, when) = (lag_s.abs() * 1e3, if lag_s > 0.0 { "later" } else { "earlier" });
     let message = format!(
-        "the simulation of {} has the same commands {ms:.1} ms {when} than the recording: its clock is another one, and was set back by that; give          both on one clock",
+        "the simulation of {} has the same commands {ms:.1} ms {when} than the recording: its clock is another one, and was set back by that; give \
+         both on one clock",
         one.id
     );
     DataQuality::new("same_clock", Level::Warn, message).run(one.id.clone()).value(lag_s, "s")
