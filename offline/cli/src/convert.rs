@@ -10,7 +10,7 @@ use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
 use recordings::stream::{Record, Source, Truth};
 use recordings::table::{self, TableSource};
-use recordings::tidy::{self, Shown, StateTable};
+use recordings::tidy;
 use recordings::{Recording, csv};
 use std::path::Path;
 use std::process::ExitCode;
@@ -37,8 +37,10 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>, stretch: Stretch)
             Err(format!("{}: states keep the arms that they have; leave --arm out, or name a table as the output", out.display()))
         }
         (Opened::States(source), Some(format), _) => states_to_states(input, cut(source, stretch), out, format),
-        (Opened::States(source), None, Some(format)) => {
-            let table = states_as_table(input, cut(source, stretch), stretch, format, arms)?;
+        (Opened::States(_), None, Some(format)) => {
+            note_all(format.losses_of_states());
+            let options = tidy::Options { arms, ..tidy::Options::default() };
+            let table = tidy::open_part(input, options, &|states| cut(states, stretch)).map_err(|error| error.to_string())?;
             table_to_table(input, table, out, format)
         }
         (Opened::Table(source), _, Some(format)) => table_to_table(input, cut_table(input, source, stretch)?, out, format),
@@ -101,23 +103,6 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
     }
     say!("{}: of {records} records", out.display());
     Ok(source.damage().map_or(ExitCode::SUCCESS, |damage| told_of(input, damage, "converted")))
-}
-
-/// Reads the stretch a first time to know its columns.
-fn states_as_table(
-    input: &Path,
-    mut first: Box<dyn Source>,
-    stretch: Stretch,
-    format: TableFormat,
-    arms: Option<Arms>,
-) -> Result<Box<dyn TableSource>, String> {
-    note_all(format.losses_of_states());
-    let shown = Shown::in_all_of(first.as_mut()).map_err(|error| error.to_string())?;
-    let Opened::States(again) = open(input).map_err(|error| error.to_string())? else {
-        return Err(format!("{}: changes while it is read; convert it when its recording has ended", input.display()));
-    };
-    let options = tidy::Options { arms, ..tidy::Options::default() };
-    Ok(Box::new(StateTable::showing(cut(again, stretch), &shown, options).map_err(|error| error.to_string())?))
 }
 
 fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, format: TableFormat) -> Result<ExitCode, String> {

@@ -50,14 +50,25 @@ pub struct Options {
 /// # Errors
 /// As [`open::open`].
 pub fn open(path: &Path, options: Options) -> Result<Box<dyn TableSource>, StreamError> {
-    let mut source = match open::open(path)? {
+    open_part(path, options, &|states| states)
+}
+
+/// The same, of states with columns for all that `part` of them holds.
+///
+/// # Errors
+/// As [`open::open`].
+pub fn open_part(
+    path: &Path,
+    options: Options,
+    part: &dyn Fn(Box<dyn Source>) -> Box<dyn Source>,
+) -> Result<Box<dyn TableSource>, StreamError> {
+    let shown = match open::open(path)? {
         Opened::Table(table) => return Ok(table),
-        Opened::States(source) => source,
+        Opened::States(source) => Shown::in_all_of(part(source).as_mut())?,
     };
-    let shown = Shown::in_all_of(source.as_mut())?;
     match open::open(path)? {
         Opened::Table(table) => Ok(table),
-        Opened::States(source) => Ok(Box::new(StateTable::showing(source, &shown, options)?)),
+        Opened::States(source) => Ok(Box::new(StateTable::showing(part(source), &shown, options)?)),
     }
 }
 
