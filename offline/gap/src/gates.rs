@@ -6,6 +6,7 @@ use recordings::Recording;
 
 use crate::motion::Motion;
 use crate::nominal::Nominal;
+use crate::readings::{NoReadings, Why};
 use crate::robot::Robot;
 use crate::run::{Both, Run, apart};
 use crate::saturation::Saturated;
@@ -21,11 +22,13 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
         all.extend(gaps(real));
+        all.extend(no_readings(real, ""));
         all.extend(saturated(robot, real));
         all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
             all.extend(itself(real, sim));
+            all.extend(no_readings(sim, "of the simulation, "));
         }
     }
     all.sort_by_key(|q| match q.level {
@@ -148,14 +151,43 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
         let message = format!("more than half of the cells of {name} are empty: this channel is not looked at");
         DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
     });
-    let at_zero = (run.at_zero > 0).then(|| {
-        let message = format!(
-            "{} positions of the tip are 0, 0, 0 to the last digit, as some trackers write a frame that they lost: taken as none; leave such cells empty",
-            run.at_zero
-        );
-        DataQuality::new("gaps", Level::Warn, message).run(run.id.clone()).value(run.at_zero as f64, "1")
-    });
-    masked.into_iter().chain(left_out).chain(at_zero).collect()
+    masked.into_iter().chain(left_out).collect()
+}
+
+/// What was taken as no reading. Of a simulation only that it is slower than its rows: without noise, numbers repeat where they are rounded.
+fn no_readings(run: &Run, whose: &str) -> Vec<DataQuality> {
+    let told = |one: &&NoReadings| whose.is_empty() || matches!(one.why, Why::Slow(_));
+    let of = |one: &NoReadings| {
+        let (of, count) = (format!("{whose}{}", one.of), one.count);
+        let (check, message) = match one.why {
+            Why::AtZero => (
+                "gaps",
+                format!(
+                    "{count} positions of {of} are 0, 0, 0 to the last digit, as some trackers write a frame that they lost: taken as none; leave such cells empty"
+                ),
+            ),
+            Why::Away => (
+                "spikes",
+                format!(
+                    "{count} readings of {of} leave the motion and are back at once, which nothing that moves does: taken as none; look for errors of its bus or tracker"
+                ),
+            ),
+            Why::Stalled => (
+                "duplicates",
+                format!(
+                    "{count} readings of {of} repeat the one before in the middle of a motion: taken as none; look for lost packets"
+                ),
+            ),
+            Why::Slow(rows) => (
+                "duplicates",
+                format!(
+                    "{of} has a new reading every {rows} rows and repeats it until then, as if it were late: the {count} repeats are taken as none; leave such cells empty"
+                ),
+            ),
+        };
+        DataQuality::new(check, Level::Warn, message).run(run.id.clone()).value(count as f64, "1")
+    };
+    run.no_readings.iter().filter(told).map(of).collect()
 }
 
 /// Torques that stand at a limit.

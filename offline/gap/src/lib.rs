@@ -24,6 +24,7 @@ pub mod pair;
 pub mod parallel;
 pub mod parameters;
 pub mod problem;
+pub mod readings;
 pub mod refine;
 pub mod robot;
 pub mod run;

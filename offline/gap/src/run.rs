@@ -1,10 +1,13 @@
 //! One run: the columns that the engine uses, on a uniform clock, in SI and at the joints.
 
+use std::cell::RefCell;
+
 use nalgebra::DMatrix;
 use recordings::Recording;
 
 use crate::clock::{Clock, by_points};
 use crate::past::Past;
+use crate::readings::{self, Kind, NoReadings};
 use crate::robot::Robot;
 use crate::run_error::RunError;
 use crate::saturation::{self, Saturated};
@@ -46,8 +49,8 @@ pub struct Run {
     pub motor: Option<Vec<Vec<f64>>>,
     /// Measured tip in the base frame, m; NaN where there was no frame.
     pub tip: Option<[Vec<f64>; 3]>,
-    /// Rows in which the tip stood at 0, 0, 0 to the last digit, which are taken for frames that were lost.
-    pub at_zero: usize,
+    /// What stands in the recording and was taken as no reading.
+    pub no_readings: Vec<NoReadings>,
     /// Samples that were not recorded, in which the series are bridged, or in which a torque stands at its limit: nothing may be concluded
     /// from them.
     pub mask: Vec<bool>,
@@ -123,27 +126,37 @@ impl Run {
             recording.column(source).map(|column| column.iter().map(|x| x * scale).collect::<Vec<f64>>())
         };
         let column = |name: &str| mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec));
-        // A column without a single value is not there.
-        let series = |name: &str| {
-            let column = column(name)?;
-            column.iter().any(|x| x.is_finite()).then(|| clock.resample(&time, &column))
+        let no_readings = RefCell::new(Vec::new());
+        // A column without a single value is not there. A sensor's is without what is no reading of it.
+        let series = |kind: Option<Kind>, name: &str| {
+            let mut set = [column(name).filter(|column| column.iter().any(|x| x.is_finite()))?];
+            if let (Some(kind), false) = (kind, clock.points) {
+                no_readings.borrow_mut().extend(readings::without_false(&mut set, clock.dt_s, name, kind));
+            }
+            Some(clock.resample(&time, &set[0]))
         };
         let unit = |j: usize| if robot.prismatic[j] { "m" } else { "rad" };
         // The first of the names that every joint has.
-        let all = |names: &[&dyn Fn(usize) -> String]| {
-            names.iter().find_map(|name| (0..n).map(|j| series(&name(j))).collect::<Option<Vec<_>>>())
+        let all = |kind: Option<Kind>, names: &[&dyn Fn(usize) -> String]| {
+            names.iter().find_map(|name| (0..n).map(|j| series(kind, &name(j))).collect::<Option<Vec<_>>>())
         };
-        let motor = all(&[&|j| format!("mpos_{}_rad", j + 1)]);
-        let reported = all(&[
-            &|j| format!("jpos_{}_{}", j + 1, unit(j)),
-            &|j| format!("q_{}_{}", j + 1, unit(j)),
-            &|j| format!("q_{}", j + 1),
-            &|j| format!("q_des_{}", j + 1),
-            &|j| format!("q_des_{}_{}", j + 1, unit(j)),
-        ]);
+        let (place, force) = (Some(Kind::Place), Some(Kind::Force));
+        let motor = all(place, &[&|j| format!("mpos_{}_rad", j + 1)]);
+        let reported = || {
+            all(
+                place,
+                &[
+                    &|j| format!("jpos_{}_{}", j + 1, unit(j)),
+                    &|j| format!("q_{}_{}", j + 1, unit(j)),
+                    &|j| format!("q_{}", j + 1),
+                    &|j| format!("q_des_{}", j + 1),
+                    &|j| format!("q_des_{}_{}", j + 1, unit(j)),
+                ],
+            )
+        };
         let from_motors = motor.is_some();
-        let position = match (&motor, reported) {
-            (Some(motor), _) => {
+        let position = match &motor {
+            Some(motor) => {
                 let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
                 let mut joints = combine(&inverse, motor);
                 for (series, drive) in joints.iter_mut().zip(&robot.drives) {
@@ -153,17 +166,10 @@ impl Run {
                 }
                 joints
             }
-            (None, Some(reported)) => reported,
-            (None, None) => {
-                let joint = (0..n).find(|&j| series(&format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
-                return Err(RunError::NoPosition {
-                    run,
-                    joint: joint + 1,
-                    unit: unit(joint),
-                    robot: robot.name.clone(),
-                    joints: n,
-                });
-            }
+            None => reported().ok_or_else(|| {
+                let joint = (0..n).find(|&j| series(None, &format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
+                RunError::NoPosition { run: run.clone(), joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n }
+            })?,
         };
         // Torques as they were recorded, before motors become joints: that is where a limit shows.
         let mut limited = (Vec::new(), vec![false; position[0].len()]);
@@ -172,17 +178,21 @@ impl Run {
             tau
         };
         let at_joints = |tau: Vec<Vec<f64>>| combine(&robot.motor_from_joint.transpose(), &tau);
-        let motor_torque =
-            all(&[&|j| format!("tau_{}_nm", j + 1)]).filter(|_| from_motors || recording.column("jtau_1_nm").is_none());
+        let of_motors = from_motors || recording.column("jtau_1_nm").is_none();
+        let motor_torque = of_motors.then(|| all(force, &[&|j| format!("tau_{}_nm", j + 1)])).flatten();
         let joint_torque = || {
             let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
-            all(&[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
-                format!("tau_{}_{}", j + 1, if robot.prismatic[j] { "N" } else { "Nm" })
-            }])
+            let old = |j: usize| if robot.prismatic[j] { "N" } else { "Nm" };
+            all(
+                force,
+                &[&|j| format!("jtau_{}_{}", j + 1, effort(j)), &|j| format!("tau_{}", j + 1), &|j| {
+                    format!("tau_{}_{}", j + 1, old(j))
+                }],
+            )
         };
         let counted = || {
             let known = robot.drives.iter().all(|drive| drive.torque_per_count != 0.0);
-            let counts = all(&[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
+            let counts = all(force, &[&|j| format!("dac_{}_counts", j + 1)]).filter(|_| known)?;
             let torque =
                 counts.iter().zip(&robot.drives).map(|(dac, drive)| dac.iter().map(|x| x * drive.torque_per_count).collect());
             Some(torque.collect())
@@ -192,19 +202,26 @@ impl Run {
             (None, Some(joints)) => Some(see(joints)),
             (None, None) => counted().map(|motors| at_joints(see(motors))),
         };
-        let (mut tip, at_zero) = match ["x", "y", "z"].map(|axis| column(&format!("truth_{axis}_m"))) {
+        let mut tip = match ["x", "y", "z"].map(|axis| column(&format!("truth_{axis}_m"))) {
             [Some(x), Some(y), Some(z)] => {
-                let (tip, at_zero) = without_zeros([x, y, z]);
+                let mut tip = [x, y, z];
+                no_readings.borrow_mut().extend(readings::without_zeros(&mut tip));
+                if !clock.points {
+                    no_readings.borrow_mut().extend(readings::without_false(&mut tip, clock.dt_s, "the tip", Kind::Place));
+                }
                 let seen = tip.iter().all(|axis| axis.iter().any(|x| x.is_finite()));
-                (seen.then(|| tip.map(|axis| clock.resample(&time, &axis))), at_zero)
+                seen.then(|| tip.map(|axis| clock.resample(&time, &axis)))
             }
-            _ => (None, 0),
+            _ => None,
         };
-        let truth = all(&[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
-            format!("q_act_{}_{}", j + 1, unit(j))
-        }]);
+        let truth = all(
+            place,
+            &[&|j| format!("truth_jpos_{}_{}", j + 1, unit(j)), &|j| format!("q_act_{}", j + 1), &|j| {
+                format!("q_act_{}_{}", j + 1, unit(j))
+            }],
+        );
         // The arm is joints 1 to 3: what the wrist moves the tip by is no difference of them.
-        let wrist = |name: &str| (4..=7).map(|j| series(&format!("{name}_{j}_rad"))).collect::<Option<Vec<_>>>();
+        let wrist = |name: &str| (4..=7).map(|j| series(None, &format!("{name}_{j}_rad"))).collect::<Option<Vec<_>>>();
         let with_wrist = robot.with_wrist.is_some() && tip.is_some();
         if let (Some(tip), Some(wrist)) = (&mut tip, with_wrist.then(|| wrist("truth_jpos").or_else(|| wrist("jpos"))).flatten()) {
             straighten(robot, tip, truth.as_ref().unwrap_or(&position), &wrist);
@@ -221,10 +238,10 @@ impl Run {
             position,
             torque,
             truth,
-            command: all(&[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
+            command: all(None, &[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
-            at_zero,
+            no_readings: no_readings.into_inner(),
             left_out: Vec::new(),
             saturated: limited.0,
         };
@@ -352,7 +369,7 @@ impl Run {
             command: self.command.as_ref().map(set),
             motor: self.motor.as_ref().map(set),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(series)),
-            at_zero: self.at_zero,
+            no_readings: self.no_readings.clone(),
             mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
             left_out: self.left_out.clone(),
             saturated: self.saturated.clone(),
@@ -377,7 +394,7 @@ impl Run {
             command: self.command.as_ref().map(cut),
             motor: self.motor.as_ref().map(cut),
             tip: self.tip.as_ref().map(|tip| tip.each_ref().map(|s| s[from..to].to_vec())),
-            at_zero: self.at_zero,
+            no_readings: self.no_readings.clone(),
             mask: self.mask[from..to].to_vec(),
             left_out: self.left_out.clone(),
             saturated: self.saturated.clone(),
@@ -511,26 +528,6 @@ pub fn common(real: &Run, sim: &Run) -> Result<(Run, Run), RunError> {
     Ok((real, sim))
 }
 
-/// Share of its usual distance from the origin that a tip never comes nearer to it, where 0, 0, 0 is no place but a frame that was lost.
-const NEVER_NEARER: f64 = 0.1;
-
-/// A tip without what some trackers write where they lost it, and in how many rows they did.
-fn without_zeros(mut tip: [Vec<f64>; 3]) -> ([Vec<f64>; 3], usize) {
-    let distance = |i: usize| tip.iter().map(|axis| axis[i].powi(2)).sum::<f64>().sqrt();
-    let (zero, elsewhere): (Vec<usize>, Vec<usize>) =
-        (0..tip[0].len()).filter(|i| distance(*i).is_finite()).partition(|i| distance(*i) == 0.0);
-    let usual = rms(elsewhere.iter().map(|i| distance(*i)));
-    if elsewhere.iter().any(|i| distance(*i) < NEVER_NEARER * usual) {
-        return (tip, 0);
-    }
-    for axis in &mut tip {
-        for i in &zero {
-            axis[*i] = f64::NAN;
-        }
-    }
-    (tip, zero.len())
-}
-
 /// Takes off a tip what the wrist moves it by, wherever there is one.
 fn straighten(robot: &Robot, tip: &mut [Vec<f64>; 3], joints: &[Vec<f64>], wrist: &[Vec<f64>]) {
     let (Ok(joints), Ok(wrist)) = (<&[Vec<f64>; 3]>::try_from(joints), <&[Vec<f64>; 4]>::try_from(wrist)) else { return };
@@ -589,7 +586,7 @@ impl Run {
             command: None,
             motor: None,
             tip: None,
-            at_zero: 0,
+            no_readings: Vec::new(),
             mask: vec![false; series.len()],
             left_out: Vec::new(),
             saturated: Vec::new(),

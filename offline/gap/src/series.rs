@@ -37,3 +37,12 @@ pub fn less_means(series: &[f64], run_of: impl Fn(usize) -> usize) -> Vec<f64> {
         (0..runs).map(|r| mean(&(0..series.len()).filter(|k| run_of(*k) == r).map(|k| series[k]).collect::<Vec<_>>())).collect();
     series.iter().enumerate().map(|(k, y)| y - means[run_of(k)]).collect()
 }
+
+/// The value below which a share of some lies, which it sorts; 0 of nothing.
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = (share * (values.len() - 1) as f64).round() as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}

@@ -225,6 +225,10 @@ const SECOND: f64 = 0.75;
 /// And at most where it leaves far more than noise nearly all the time: such names were wrong in opened sets (6 of 6).
 const LEAVES: f64 = 0.5;
 
+/// And at most where its own interval holds that there is nothing: of three such names in an opened set two were wrong. (Not of hysteresis, whose
+/// share of a straight spring says that alone; both of these were right.)
+const MAY_BE_NOTHING: f64 = 0.5;
+
 /// The primary verdict of an effect and its alternatives.
 fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, threshold: f64, artifact: Artifact) -> Vec<Verdict> {
     let number = k as u64 + 1;
@@ -236,11 +240,10 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let candidate = &effect.chosen.candidate;
     let cell = main_cell(found.floors, candidate, &estimate.coefficients);
     let leaves = found.unexplained.as_ref().is_some_and(|left| left.cell == cell);
-    let at_most = match (leaves, effect.second) {
-        (true, _) => LEAVES,
-        (false, true) => SECOND,
-        (false, false) => 1.0,
-    };
+    let family = &candidate.family;
+    let nothing = family.physics != "cable_hysteresis" && estimate.may_be_nothing(family);
+    let caps = [(leaves, LEAVES), (effect.second, SECOND), (nothing, MAY_BE_NOTHING)];
+    let at_most = caps.iter().filter(|(holds, _)| *holds).fold(1.0, |least: f64, (_, cap)| least.min(*cap));
     let probability = (1.0 / total).min(at_most);
     let physics = physics(candidate);
     let mut location = location(found, k, effect.share);

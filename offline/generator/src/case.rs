@@ -3,12 +3,14 @@
 use crate::arm::DryLaw;
 use crate::bench::Bench;
 use crate::effect::Effect;
+use crate::logger::{Faults, Logging};
 use crate::order::{Kind, Order, Sealed, Truth};
 use crate::random::Random;
 use crate::robots::{self, Pair};
 use crate::run::{Robot, Signals, play};
 use crate::scene::Scene;
 use crate::sensors::{Noise, record};
+use crate::table::FRAME;
 use crate::trajectory::{self, Trajectory};
 use crate::{seal, table, urdf};
 use std::collections::BTreeMap;
@@ -82,19 +84,23 @@ impl Order {
             .collect::<Result<_, _>>()?;
         let plain: Vec<Effect> = effects.iter().map(|sealed| sealed.effect.clone()).collect();
 
+        let faults = (self.logging == Logging::Faulty).then(|| Faults::draw(&mut self.random("logger")));
         let mut files = BTreeMap::from([("robot.urdf".to_owned(), urdf::text(&pair.model).into_bytes())]);
         for (run, trajectory) in trajectories.iter().enumerate() {
             let plain: Vec<Effect> = plain.iter().map(|effect| effect.in_run(run)).collect();
-            let seen = record(
+            let mut seen = record(
                 &play(&stepped, &plain, trajectory),
                 &pair.truth,
                 &plain,
                 Some((&noise, &mut self.random(&format!("noise {run}")))),
             );
+            if let Some(faults) = &faults {
+                faults.damage(&mut seen, FRAME, &mut self.random(&format!("logger {run}")));
+            }
             let sim = record(&sims[run], &pair.truth, &[], None);
-            let write = |signals, recording| table::csv_gz(signals, &pair.model, recording).map_err(|error| error.to_string());
-            files.insert(format!("real_{}.csv.gz", run + 1), write(&seen, true)?);
-            files.insert(format!("sim_{}.csv.gz", run + 1), write(&sim, false)?);
+            let write = |signals, every_row| table::csv_gz(signals, &pair.model, every_row).map_err(|error| error.to_string());
+            files.insert(format!("real_{}.csv.gz", run + 1), write(&seen, faults.is_some_and(|faults| faults.tip_repeated))?);
+            files.insert(format!("sim_{}.csv.gz", run + 1), write(&sim, true)?);
         }
         let truth = Truth {
             schema: "ravenpose-truth-1".into(),
@@ -106,6 +112,7 @@ impl Order {
             seed: self.seed,
             excitation: self.excitation,
             robot: self.robot,
+            logging: self.logging,
             joints: pair.model.joints.iter().map(|joint| joint.name.clone()).collect(),
             dry_law: match pair.truth.dry_law {
                 DryLaw::Smooth(_) => "smooth".into(),

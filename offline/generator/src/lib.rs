@@ -21,6 +21,7 @@ mod draft_more;
 pub mod effect;
 pub mod friction;
 pub mod lagrange;
+pub mod logger;
 pub mod matrix;
 pub mod order;
 pub mod plant;

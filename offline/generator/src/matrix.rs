@@ -1,6 +1,7 @@
 //! The sets of cases: `small` for every change, `full` for a release, `dev` to tune with. Labels hold the name of the set, so no
 //! two sets share a trajectory or a parameter even at the same seed.
 
+use crate::logger::Logging;
 use crate::order::{Kind, Order, Wanted};
 use crate::random::Random;
 use crate::trajectory::Excitation;
@@ -75,12 +76,34 @@ impl Set {
     }
 
     fn nulls(&mut self, noise: f64, count: usize, runs: usize) {
+        self.nothing("null", count, |order| {
+            order.noise = noise;
+            order.runs = runs;
+        });
+    }
+
+    /// Cases without an effect, every fourth on another arm.
+    fn nothing(&mut self, block: &str, count: usize, change: impl Fn(&mut Order)) {
         for index in 0..count {
-            self.add("null", Vec::new(), |order| {
-                order.noise = noise;
-                order.runs = runs;
+            self.add(block, Vec::new(), |order| {
                 order.robot = kind(index % 4 == 3);
+                change(order);
             });
+        }
+    }
+
+    /// An arm that mostly stands, and nothing else.
+    fn standing(&mut self, count: usize) {
+        self.nothing("poor", count, |order| order.excitation = Excitation::Poor);
+    }
+
+    /// What a faulty logger wrote: of nothing, and of each effect.
+    fn faulty(&mut self, nulls: usize, severities: &[f64]) {
+        self.nothing("faulty", nulls, |order| order.logging = Logging::Faulty);
+        for physics in PHYSICS {
+            for &severity in severities {
+                self.add("faulty", vec![wanted(physics, severity)], |order| order.logging = Logging::Faulty);
+            }
         }
     }
 
@@ -189,6 +212,8 @@ fn full(seed: u64) -> Vec<Order> {
     set.outside(&[3.0, 10.0], 5);
     set.by_run(&[3.0, 10.0], 4);
     set.nulls(1.0, 22, 4);
+    set.standing(44);
+    set.faulty(44, &[3.0, 10.0]);
     set.orders
 }
 
@@ -210,5 +235,7 @@ fn dev(seed: u64) -> Vec<Order> {
     set.pairs(20, &[3.0]);
     set.outside(&[3.0, 10.0], 1);
     set.by_run(&[10.0], 2);
+    set.standing(12);
+    set.faulty(12, &[3.0]);
     set.orders
 }

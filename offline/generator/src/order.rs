@@ -1,6 +1,7 @@
 //! What is asked for, and what is sealed.
 
 use crate::effect::Effect;
+use crate::logger::Logging;
 use crate::severity::Channel;
 use crate::trajectory::Excitation;
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,8 @@ pub struct Order {
     pub seconds: f64,
     /// Number of runs.
     pub runs: usize,
+    /// How they are logged.
+    pub logging: Logging,
 }
 
 impl Default for Order {
@@ -79,6 +82,7 @@ impl Default for Order {
             robot: Kind::Raven,
             seconds: 12.0,
             runs: 2,
+            logging: Logging::Faithful,
         }
     }
 }
@@ -126,6 +130,9 @@ pub struct Truth {
     pub excitation: Excitation,
     /// Kind of arm.
     pub robot: Kind,
+    /// How it was logged, where that is not as it was read.
+    #[serde(default, skip_serializing_if = "Logging::is_faithful")]
+    pub logging: Logging,
     /// Joint names, from the base outward.
     pub joints: Vec<String>,
     /// `smooth` or `bristle`.

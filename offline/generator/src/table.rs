@@ -10,19 +10,19 @@ use std::io::Write as _;
 /// Samples between two frames of the tip in a recording.
 pub const FRAME: usize = 20;
 
-/// The bytes of a `.csv.gz`. `recording`: the tip comes at 50 Hz; otherwise at every sample, as a simulator has it.
+/// The bytes of a `.csv.gz`. `every_row`: the tip stands in every row, as a simulator has it; otherwise it comes at 50 Hz.
 ///
 /// # Errors
 ///
 /// Those of the compressor.
-pub fn csv_gz(signals: &Signals, arm: &Arm, recording: bool) -> std::io::Result<Vec<u8>> {
-    let text = csv(signals, arm, recording);
+pub fn csv_gz(signals: &Signals, arm: &Arm, every_row: bool) -> std::io::Result<Vec<u8>> {
+    let text = csv(signals, arm, every_row);
     let mut gz = GzBuilder::new().mtime(0).write(Vec::new(), Compression::new(3));
     gz.write_all(text.as_bytes())?;
     gz.finish()
 }
 
-fn csv(signals: &Signals, arm: &Arm, recording: bool) -> String {
+fn csv(signals: &Signals, arm: &Arm, every_row: bool) -> String {
     let samples = signals.tip.len();
     let mut text = String::with_capacity(samples * (60 + 70 * arm.size()));
     let _ = write!(text, "# robot = {}\n# sample_hz = {RATE}\nt_s", arm.name);
@@ -54,7 +54,7 @@ fn csv(signals: &Signals, arm: &Arm, recording: bool) -> String {
         row(&mut signals.command[k].iter().copied(), 7);
         row(&mut signals.joint[k].iter().copied(), 7);
         row(&mut signals.reported_tip[k].iter().map(|x| x * 1e3), 4);
-        if recording && !k.is_multiple_of(FRAME) {
+        if !every_row && !k.is_multiple_of(FRAME) {
             text.push_str(",,,\n");
         } else {
             row(&mut signals.tip[k].iter().map(|x| x * 1e3), 4);

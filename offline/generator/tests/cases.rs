@@ -3,6 +3,7 @@
 use generator::batch;
 use generator::case::Case;
 use generator::effect::{ALWAYS, NEVER};
+use generator::logger::Logging;
 use generator::order::{Kind, Order, Wanted};
 use generator::{matrix, seal};
 use std::collections::BTreeMap;
@@ -210,6 +211,37 @@ fn runs_are_apart_and_the_simulation_has_no_noise() {
 }
 
 #[test]
+fn a_faulty_logger_changes_what_is_logged_and_nothing_else() {
+    let faithful = order("logged", &[("backlash", 10.0)]);
+    let faulty = Order { logging: Logging::Faulty, ..faithful.clone() };
+    let [faithful, faulty] = [faithful, faulty].map(|order| order.make().unwrap());
+    assert_eq!(faithful.files["sim_1.csv.gz"], faulty.files["sim_1.csv.gz"]);
+    assert_eq!(faithful.files["robot.urdf"], faulty.files["robot.urdf"]);
+    assert_eq!(seal::canonical(&faithful.truth.effects), seal::canonical(&faulty.truth.effects));
+    let [clean, damaged] = [&faithful, &faulty].map(|case| cells(&case.files["real_1.csv.gz"]));
+    let differ = |name: &str| {
+        let at = clean[0].iter().position(|column| column == name).unwrap();
+        clean.iter().zip(&damaged).filter(|(a, b)| a[at] != b[at]).count()
+    };
+    assert_eq!(["t_s", "jpos_d_1_rad", "x_mm"].map(differ), [0; 3]);
+    for quantity in [["mpos_1_rad", "mpos_2_rad", "mpos_3_rad"], ["tau_1_nm", "tau_2_nm", "tau_3_nm"]] {
+        assert!(quantity.map(differ).iter().sum::<usize>() > 0, "{quantity:?}");
+    }
+    assert!(differ("truth_jpos_3_m") > 0);
+    // Where nothing is damaged nothing says so.
+    assert!(
+        !seal::canonical(&faithful.truth).contains("logging") && seal::canonical(&faulty.truth).contains(r#""logging":"faulty""#)
+    );
+}
+
+/// A table's cells, its header first.
+fn cells(gz: &[u8]) -> Vec<Vec<String>> {
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(gz), &mut text).unwrap();
+    text.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+#[test]
 fn other_arms_hold_their_course() {
     for k in 0..6 {
         let mut order = order(&format!("variant {k}"), &[]);
@@ -234,8 +266,8 @@ fn sets_have_the_cases_of_the_design() {
     let count = |orders: &[Order], block: &str| orders.iter().filter(|order| order.block == block).count();
     let full = matrix::named("full", 1).unwrap();
     assert_eq!(
-        ["single", "null", "pairs", "outside", "poor", "by_run"].map(|block| count(&full, block)),
-        [990, 352, 120, 60, 110, 88]
+        ["single", "null", "pairs", "outside", "poor", "by_run", "faulty"].map(|block| count(&full, block)),
+        [990, 352, 120, 60, 154, 88, 88]
     );
     let small = matrix::named("small", 1).unwrap();
     assert_eq!(["single", "null"].map(|block| count(&small, block)), [66, 30]);

@@ -87,13 +87,17 @@ pub fn tables(score: &Score) -> Vec<Table> {
     tables.push(Table {
         title: "False alarms".into(),
         note: "Null cases; the bound is Clopper and Pearson's, one-sided 95 %.".into(),
-        head: words(&["noise", "alarms", "at most"]),
+        head: words(&["nulls", "alarms", "at most"]),
         rows: score
             .nulls
             .iter()
             .map(|null| {
-                let noise = if null.noise == 0.0 { "all".into() } else { format!("x {}", null.noise) };
-                vec![noise, format!("{} of {}", null.alarms.hits, null.alarms.of), format!("{:.1} %", 100.0 * null.upper95)]
+                let which = match (null.block.as_str(), null.noise) {
+                    ("", _) => "all".into(),
+                    (block, 0.0) => format!("`{block}`"),
+                    (_, noise) => format!("noise x {noise}"),
+                };
+                vec![which, format!("{} of {}", null.alarms.hits, null.alarms.of), format!("{:.1} %", 100.0 * null.upper95)]
             })
             .collect(),
     });

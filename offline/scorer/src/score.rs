@@ -23,6 +23,8 @@ pub struct Group {
 /// Figures of null cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct Nulls {
+    /// Block, where it is of one block.
+    pub block: String,
     /// Noise scale; 0 for all.
     pub noise: f64,
     /// Alarms.
@@ -131,14 +133,13 @@ pub fn score(judged: Vec<Judged>, [truth_manifest_sha256, report_manifest_sha256
         push(&mut conditions, name, "single", 0.0, &pick(&|case| counted(case) && case.dry_law == law));
     }
 
-    let nulls = [0.0, 1.0, 2.0, 4.0].map(|noise| {
+    let nulls = [("", 0.0), ("null", 1.0), ("null", 2.0), ("null", 4.0), ("poor", 0.0), ("faulty", 0.0)].map(|(block, noise)| {
+        let meant = |case: &Judged| (block.is_empty() || case.block == block) && (noise == 0.0 || case.noise == noise);
         let alarms = Rate::of(
             // Who gives no report has not said that there is nothing.
-            pick(&|case| case.truth == ["none"] && (noise == 0.0 || case.noise == noise))
-                .iter()
-                .map(|case| case.detected || case.status == NO_REPORT),
+            pick(&|case| case.truth == ["none"] && meant(case)).iter().map(|case| case.detected || case.status == NO_REPORT),
         );
-        Nulls { noise, alarms, upper95: clopper_upper(alarms.hits, alarms.of) }
+        Nulls { block: block.to_owned(), noise, alarms, upper95: clopper_upper(alarms.hits, alarms.of) }
     });
     let pairs = LEVELS.map(|level| Pairs::of(level, &of_block("pairs", level)));
     let outside_cases = pick(&|case| case.truth == ["unmodelled"]);

@@ -4,7 +4,8 @@ use crate::common::{Case, case_of, holds, lines, made, named, near, primary, wan
 use crate::program::{Folder, done, text};
 use arm::serial::Workspace;
 use gap_report::Status;
-use generator::order::Order;
+use generator::logger::Logging;
+use generator::order::{Order, Wanted};
 use generator::trajectory::Excitation;
 use simulator::RobotModel;
 
@@ -66,6 +67,29 @@ fn frames_that_a_tracker_lost_as_zeros_are_no_link_that_is_longer() {
     let report = case.judged(&folder.file("out"));
     assert_eq!(report.status, Status::NoMismatch, "{}", report.summary);
     assert!(report.data_quality.iter().any(|quality| quality.message.contains("0, 0, 0 to the last digit")));
+}
+
+#[test]
+fn what_a_faulty_logger_wrote_is_no_physics() {
+    // Wrong words, sources that stall and such that are slower than the log: 24 of 24 such nulls had a link that is too light, a motor that is too
+    // weak, or something without a name, and 8 of 44 effects beside it their own.
+    let faulty = |seed: u64, label: &str, effects: Vec<Wanted>| {
+        let folder = Folder::new("faulty");
+        let order = Order { seed, label: label.to_owned(), effects, logging: Logging::Faulty, ..Order::default() };
+        written(&folder, &order).0.judged(&folder.file("out"))
+    };
+    for seed in [9100, 9101, 9102, 9104] {
+        let report = faulty(seed, "f", Vec::new());
+        assert_eq!(report.status, Status::NoMismatch, "{seed}: {}", report.summary);
+        for check in ["spikes", "duplicates"] {
+            assert!(report.data_quality.iter().any(|quality| quality.check == check), "{check} of {seed}");
+        }
+    }
+    for (seed, physics) in [(9200, "coulomb_friction"), (9204, "backlash"), (9209, "payload")] {
+        let effect = Wanted { physics: physics.to_owned(), severity: Some(10.0), ..Wanted::default() };
+        let report = faulty(seed, "f10", vec![effect]);
+        assert_eq!(report.verdicts[0].physics.name(), physics, "{}", report.summary);
+    }
 }
 
 #[test]
