@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn frames_of_a_camera_are_what_is_beside_one_another() {
-        // Every twentieth row, one ball mistaken, one frame repeated in its place.
+        // Every twentieth row; in one a ball was mistaken.
         let frames = |axis: usize| {
             noisy(1e-4).iter().enumerate().map(|(i, x)| if i % 20 == 0 { x + axis as f64 } else { f64::NAN }).collect()
         };
