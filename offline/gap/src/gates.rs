@@ -22,13 +22,13 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         all.extend(standing(robot, real));
         all.extend(repeated(real));
         all.extend(gaps(real));
-        all.extend(no_readings(real, ""));
+        all.extend(no_readings(real, false));
         all.extend(saturated(robot, real));
         all.extend(crate::breakaway::levels(robot, real));
         if let Some(sim) = sim {
             all.extend(another_robot(robot, real, sim));
             all.extend(itself(real, sim));
-            all.extend(no_readings(sim, "of the simulation, "));
+            all.extend(no_readings(sim, true));
         }
     }
     all.sort_by_key(|q| match q.level {
@@ -155,10 +155,10 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
 }
 
 /// What was taken as no reading. Of a simulation only that it is slower than its rows: without noise, numbers repeat where they are rounded.
-fn no_readings(run: &Run, whose: &str) -> Vec<DataQuality> {
-    let told = |one: &&NoReadings| whose.is_empty() || matches!(one.why, Why::Slow(_));
+fn no_readings(run: &Run, simulated: bool) -> Vec<DataQuality> {
+    let told = |one: &&NoReadings| !simulated || matches!(one.why, Why::Slow(_));
     let of = |one: &NoReadings| {
-        let (of, count) = (format!("{whose}{}", one.of), one.count);
+        let (of, count) = (if simulated { format!("of the simulation, {}", one.of) } else { one.of.clone() }, one.count);
         let (check, message) = match one.why {
             Why::AtZero => (
                 "gaps",

@@ -85,9 +85,7 @@ pub(crate) fn without_false(set: &mut [Vec<f64>], dt_s: f64, of: &str, kind: Kin
         }
         let stalls = Levels::of(set).stalls(set, dt_s);
         all.extend(erased(set, stalls, of, Why::Stalled));
-        let more = away_of(set, dt_s, kind);
-        erase(set, &more);
-        apart.extend(more);
+        apart.extend(away_of(set, dt_s, kind));
     }
     all.extend(erased(set, apart, of, Why::Away));
     all

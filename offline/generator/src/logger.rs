@@ -49,10 +49,11 @@ pub struct Faults {
 impl Faults {
     /// Of a case.
     pub fn draw(random: &mut Random) -> Self {
-        let mut slow = |probability: f64, least: usize, more: usize| {
+        let mut every = |probability: f64, least: usize, more: usize| {
             if random.chance(probability) { least + random.index(more) } else { 1 }
         };
-        Self { joint_every: slow(0.4, 4, 9), motor_every: slow(0.3, 2, 3), tip_repeated: slow(0.4, 2, 1) > 1 }
+        let (joint_every, motor_every) = (every(0.4, 4, 9), every(0.3, 2, 3));
+        Self { joint_every, motor_every, tip_repeated: random.chance(0.4) }
     }
 
     /// Does it to a run. A frame of the tip is there every `frame` samples.
@@ -74,15 +75,13 @@ impl Faults {
             }
         }
         if self.tip_repeated {
-            for k in 0..seen.tip.len() {
-                seen.tip[k] = seen.tip[k / frame * frame];
-            }
+            held(&mut seen.tip, frame);
         }
     }
 }
 
 /// New values only every so many samples.
-fn held(rows: &mut [Vec<f64>], every: usize) {
+fn held<T: Clone>(rows: &mut [T], every: usize) {
     for group in rows.chunks_mut(every) {
         let Some((first, others)) = group.split_first_mut() else { continue };
         for row in others {
@@ -95,14 +94,12 @@ fn held(rows: &mut [Vec<f64>], every: usize) {
 fn wrong(rows: &mut [Vec<f64>], column: usize, random: &mut Random) {
     let (low, high) =
         rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), row| (low.min(row[column]), high.max(row[column])));
-    let mut k = 0;
-    while k < rows.len() {
+    for k in 0..rows.len() {
         if random.chance(WRONG) {
             for row in rows[k..].iter_mut().take(1 + random.index(IN_A_ROW)) {
                 row[column] += random.sign() * random.uniform(0.05, 1.2) * (high - low);
             }
         }
-        k += 1;
     }
 }
 

@@ -183,21 +183,15 @@ fn nothing_of_the_truth_leaks() {
 fn runs_are_apart_and_the_simulation_has_no_noise() {
     let case = order("apart", &[]).make().unwrap();
     assert_ne!(case.files["sim_1.csv.gz"], case.files["sim_2.csv.gz"]);
-    let text = |name: &str| {
-        let mut text = String::new();
-        std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(&case.files[name][..]), &mut text).unwrap();
-        text
-    };
-    let column = |text: &str, name: &str| -> Vec<f64> {
-        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-        let at = lines.next().unwrap().split(',').position(|column| column == name).unwrap();
-        lines.filter_map(|line| line.split(',').nth(at).unwrap().parse().ok()).collect()
+    let column = |table: &[Vec<String>], name: &str| -> Vec<f64> {
+        let at = table[0].iter().position(|column| column == name).unwrap();
+        table[1..].iter().filter_map(|row| row[at].parse().ok()).collect()
     };
     let rough = |values: &[f64]| {
         let second: Vec<f64> = values.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
         (second.iter().map(|d| d * d).sum::<f64>() / second.len() as f64 / 6.0).sqrt()
     };
-    let (real, sim) = (text("real_1.csv.gz"), text("sim_1.csv.gz"));
+    let [real, sim] = ["real_1.csv.gz", "sim_1.csv.gz"].map(|name| cells(&case.files[name]));
     let noise = rough(&column(&real, "truth_jpos_1_rad"));
     assert!((noise / 0.3e-3 - 1.0).abs() < 0.05, "{noise}");
     assert!(rough(&column(&sim, "truth_jpos_1_rad")) < 2e-6);
