@@ -72,7 +72,7 @@ fn frames_that_a_tracker_lost_as_zeros_are_no_link_that_is_longer() {
 #[test]
 fn what_a_faulty_logger_wrote_is_no_physics() {
     // Wrong words, sources that stall and such that are slower than the log: 24 of 24 such nulls had a link that is too light, a motor that is too
-    // weak, or something without a name, and 8 of 44 effects beside it their own.
+    // weak, or something without a name, and 2 of 44 effects beside it their own.
     let faulty = |seed: u64, label: &str, effects: Vec<Wanted>| {
         let folder = Folder::new("faulty");
         let order = Order { seed, label: label.to_owned(), effects, logging: Logging::Faulty, ..Order::default() };
