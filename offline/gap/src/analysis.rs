@@ -392,7 +392,8 @@ fn analyse_with(
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {
-            crate::series::rms(left(&problem, c, &sized(&answer.effects, &estimates)).into_iter()) >= problem.practical.any[c]
+            let left = crate::series::rms(left(&problem, c, &sized(&answer.effects, &estimates)).into_iter());
+            left >= problem.practical.any[c].max(problem.own_error(c))
         })
         && beyond > 2.0 * options.thresholds.nats
         && ceiling.least_nats > options.thresholds.nats

@@ -27,12 +27,14 @@ pub struct Cell {
     /// Places of the rows that say nothing, where residual and columns are 0: a drive is held by its friction, which takes
     /// any force below its level, or elastic joints shake each other.
     pub silent: Vec<usize>,
+    /// What the nominal model misses at each row of the simulation's own torque; empty where none says it.
+    pub missed: Vec<f64>,
 }
 
 impl Cell {
     /// Without rows.
     pub(crate) fn new(channel: Channel, index: usize) -> Self {
-        Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new() }
+        Self { channel, index, rows: Vec::new(), residual: Vec::new(), silent: Vec::new(), missed: Vec::new() }
     }
 
     /// Of each row, whether it says something.

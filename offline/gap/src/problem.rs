@@ -69,6 +69,8 @@ const BEYOND: f64 = 2.0;
 const WITHIN_A_CYCLE: f64 = 2e-3;
 /// Share of what the model leaves of its own simulation's torque that may be left: of nulls of an arm that mostly stands a third is.
 const OF_ITS_OWN: f64 = 0.5;
+/// Share of what the model misses of the simulation's torque at a row that may be left there: nearly all that such nulls leave is less.
+const OF_A_MISS: f64 = 0.4;
 /// Does a joint move, in some run, so that its torque says more than where it hangs?
 fn moves(robot: &Robot, pairs: &[Pair], j: usize) -> bool {
     pairs.iter().any(|pair| robot.moves(j, &pair.real.position[j]))
@@ -147,6 +149,13 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// At which rows of a cell the model misses the simulation's own torque by far more than an effect is: where it is wrong, recording and simulation
+    /// differ by a part of its error as soon as they do not pass by there alike.
+    pub(crate) fn is_within_a_miss<'e>(&'e self, c: usize, effect: &'e [f64]) -> impl Iterator<Item = bool> + 'e {
+        let missed = self.cells[c].missed.iter().copied().chain(std::iter::repeat(0.0));
+        effect.iter().zip(missed).map(|(e, missed)| e.abs() < OF_A_MISS * missed.abs())
+    }
+
     /// Are its rows points without a clock?
     pub(crate) fn of_points(&self) -> bool {
         self.pairs.iter().all(|pair| pair.real.run.points)
@@ -176,6 +185,8 @@ impl<'a> Problem<'a> {
                 residual.iter_mut().zip(&own).for_each(|(out, own)| *out -= own);
                 let noise = noise_of(&residual, |_, _| true);
                 cell.silent.extend(self.shaking[r].rows(&own, pair, j, noise).map(|k| first_row + k));
+                cell.missed.resize(first_row, 0.0);
+                cell.missed.extend(own);
             }
             for motion in std::iter::once(&pair.real).chain(&pair.sim) {
                 for held in dry.iter().map(|(d, _)| held(motion, *d)) {

@@ -4,9 +4,9 @@ use std::time::{Instant, SystemTime};
 
 use gap_report::{
     Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Feature, Fit as FitFigure,
-    Format, Inputs, Interval, Level, Location, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining, Report, Role,
-    Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict, ranked,
-    timestamp,
+    Format, Inputs, Interval, Level, Location, MODEL_ERROR, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining,
+    Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict,
+    ranked, timestamp,
 };
 
 use crate::cell::Channel;
@@ -439,6 +439,10 @@ fn excess(found: &Found) -> Vec<ExcessRms> {
         .map(|(c, cell)| {
             let size = cell.rms(&cell.residual);
             let rows = cell.says().into_iter().filter(|says| *says).count();
+            let mut extra = gap_report::Extra::default();
+            if !cell.missed.is_empty() {
+                extra.set(MODEL_ERROR, cell.rms(&cell.missed));
+            }
             ExcessRms {
                 channel: told(cell.channel),
                 // An axis of the tip is no joint.
@@ -447,7 +451,7 @@ fn excess(found: &Found) -> Vec<ExcessRms> {
                 unit: cell_unit(found.robot, cell).to_owned(),
                 noise_floor: found.floors[c],
                 n_effective: Some(rows as f64 / found.answer.scorer.correlation[c]),
-                extra: gap_report::Extra::default(),
+                extra,
             }
         })
         .collect()

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 const USAGE: &str =
-    "usage: ravenpose-generate (--matrix small|full|dev | --case JSON) --out DIR [--seed N] [--only BLOCK] [--jobs N]";
+    "usage: ravenpose-generate (--matrix small|full|dev | --case JSON) --out DIR [--seed N] [--only BLOCK|CASE] [--jobs N]";
 
 struct Arguments {
     orders: Vec<Order>,
@@ -49,11 +49,11 @@ fn parse(mut words: impl Iterator<Item = String>) -> Result<Arguments, String> {
         (None, Some(text)) => vec![serde_json::from_str(text).map_err(|error| format!("--case: {error}"))?],
         _ => return Err(USAGE.into()),
     };
-    if let Some(block) = given.get("only") {
-        orders.retain(|order| &order.block == block);
-    }
-    if orders.is_empty() {
-        return Err("no case has this block".into());
+    if let Some(wanted) = given.get("only") {
+        orders.retain(|order| &order.block == wanted || &order.id() == wanted);
+        if orders.is_empty() {
+            return Err(format!("--only {wanted}: neither a block of this matrix nor a case of this seed"));
+        }
     }
     Ok(Arguments { orders, out, jobs: jobs.max(1) })
 }

@@ -54,7 +54,8 @@ pub(super) fn tiles(report: &Report) -> String {
         tiles.push(Tile::new(&capital(&fit.quantity), change(fit), &floor));
     } else if let Some(worst) = report.mismatch.excess_rms.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
         let name = format!("Largest beyond noise{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
-        let floor = format!("noise alone {}", as_given(worst.noise_floor, &worst.unit));
+        let of_model = worst.model_error().map(|own| format!(", the model\u{2019}s own error {}", as_given(own, &worst.unit)));
+        let floor = format!("noise alone {}{}", as_given(worst.noise_floor, &worst.unit), of_model.unwrap_or_default());
         tiles.push(Tile::new(&name, as_given(worst.value, &worst.unit), &floor));
     }
     let mut resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);

@@ -105,7 +105,14 @@ fn agreement(report: &Report) -> Option<String> {
     }
     let worst = report.mismatch.excess_rms.iter().max_by(|a, b| (a.value / a.noise_floor).total_cmp(&(b.value / b.noise_floor)))?;
     let (value, floor) = (as_given(worst.value, &worst.unit), as_given(worst.noise_floor, &worst.unit));
-    Some(format!("largest difference beyond noise {value}, noise alone {floor}"))
+    let of_model = |own| {
+        format!(
+            "; there the model that was learnt from the simulation misses {} of the simulation itself",
+            as_given(own, &worst.unit)
+        )
+    };
+    let of_model = worst.model_error().map_or_else(String::new, of_model);
+    Some(format!("largest difference beyond noise {value}, noise alone {floor}{of_model}"))
 }
 
 fn left_over(report: &Report) -> Option<String> {

@@ -21,6 +21,7 @@ pub use inputs::{Access, Channel, Inputs, Robot, Run, RunKind, RunRole, Simulato
 pub use location::{Feature, Interval, Location, Regime, Region, RegionKind, Subsystem};
 pub use parameter::{CiMethod, Identifiable, Parameter};
 pub use report::{
-    Calibration, DataQuality, ExcessRms, Level, Mismatch, Remaining, Report, SCHEMA_VERSION, SealedCase, Status, Timing,
+    Calibration, DataQuality, ExcessRms, Level, MODEL_ERROR, Mismatch, Remaining, Report, SCHEMA_VERSION, SealedCase, Status,
+    Timing,
 };
 pub use verdict::{Role, Verdict, ranked};

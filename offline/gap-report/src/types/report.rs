@@ -156,6 +156,9 @@ pub struct Mismatch {
     pub extra: Extra,
 }
 
+/// Key of an excess's `extra`: RMS of what the nominal model misses of the simulation's own channel, in the same unit.
+pub const MODEL_ERROR: &str = "x_model_error";
+
 /// What a residual has beyond noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExcessRms {
@@ -176,6 +179,14 @@ pub struct ExcessRms {
     /// Further keys.
     #[serde(flatten)]
     pub extra: Extra,
+}
+
+impl ExcessRms {
+    /// What the nominal model is known to get wrong there, where it is beyond noise but no more than that.
+    pub fn model_error(&self) -> Option<f64> {
+        let own = self.extra.get(MODEL_ERROR)?.as_f64()?;
+        (self.noise_floor < self.value && self.value < own).then_some(own)
+    }
 }
 
 /// What is left when all accepted effects are in.

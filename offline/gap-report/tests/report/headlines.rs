@@ -3,8 +3,8 @@
 use crate::common;
 
 use gap_report::{
-    Channel, DataQuality, Evidence, Feature, Identifiable, Interval, Level, Location, Motion, Parameter, Physics, Regime,
-    Subsystem, TestMethod, Verdict, headline, headlines, quality_headline, vocabulary, words,
+    Channel, DataQuality, Evidence, Feature, Identifiable, Interval, Level, Location, MODEL_ERROR, Motion, Parameter, Physics,
+    Regime, Subsystem, TestMethod, Verdict, headline, headlines, quality_headline, vocabulary, words,
 };
 
 /// A sure verdict with parameters of the vocabulary, each with an interval of a tenth to both sides.
@@ -326,4 +326,21 @@ fn words_are_short_plain_and_begin_with_the_answer() {
     }
     assert!(words(&long).lines().count() <= 15);
     assert!(words(&long).contains("12.1 N"));
+}
+
+#[test]
+fn what_the_model_misses_itself_is_said_of_an_agreement_that_is_no_more_than_that() {
+    let mut report = common::no_mismatch();
+    report.verdicts[0].evidence[0].effect = None;
+    let told = |report: &gap_report::Report, own: f64| {
+        let mut report = report.clone();
+        report.mismatch.excess_rms[0].extra.set(MODEL_ERROR, own);
+        words(&report).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let of_model = "; there the model that was learnt from the simulation misses";
+    assert!(told(&report, 2.5).contains(&format!("noise alone 0.120 N m{of_model} 2.50 N m of the simulation itself")));
+    assert!(!told(&report, 0.5).contains(of_model));
+    // What is not beyond noise needs no other reason.
+    report.mismatch.excess_rms[0].value = 0.1;
+    assert!(!told(&report, 2.5).contains(of_model));
 }
