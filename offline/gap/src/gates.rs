@@ -10,7 +10,7 @@ use crate::readings::{NoReadings, Why};
 use crate::robot::Robot;
 use crate::run::{Both, Run, apart};
 use crate::saturation::Saturated;
-use crate::series::rms;
+use crate::series::{resolution, rms};
 
 /// Speed that counts as motion, of the largest speed.
 const MOVING: f64 = 0.05;
@@ -123,11 +123,12 @@ fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
         .collect()
 }
 
-/// Rows that repeat the one before while the robot moves.
+/// Rows that repeat the one before while the robot moves by more than it resolves.
 fn repeated(run: &Run) -> Option<DataQuality> {
     let speeds: Vec<Vec<f64>> = (0..run.position.len()).map(|j| velocity(run, j)).collect();
     let top: Vec<f64> = speeds.iter().map(|s| s.iter().fold(0.0, |m: f64, v| m.max(v.abs()))).collect();
-    let moving = |i: usize| speeds.iter().zip(&top).any(|(s, t)| s[i].abs() > MOVING * t);
+    let seen_from: Vec<f64> = run.position.iter().zip(&top).map(|(s, t)| (MOVING * t).max(resolution(s) / run.dt_s)).collect();
+    let moving = |i: usize| speeds.iter().zip(&seen_from).any(|(s, least)| s[i].abs() > *least);
     let same = |i: usize| run.position.iter().all(|s| s[i] == s[i - 1]);
     let count = (1..run.len()).filter(|&i| moving(i)).count().max(1);
     let repeats = (1..run.len()).filter(|&i| moving(i) && same(i)).count();
@@ -156,38 +157,68 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
 
 /// What was taken as no reading. Of a simulation only that it is slower than its rows: without noise, numbers repeat where they are rounded.
 fn no_readings(run: &Run, simulated: bool) -> Vec<DataQuality> {
-    let told = |one: &&NoReadings| !simulated || matches!(one.why, Why::Slow(_));
-    let of = |one: &NoReadings| {
-        let (of, count) = (if simulated { format!("of the simulation, {}", one.of) } else { one.of.clone() }, one.count);
-        let (check, message) = match one.why {
+    let all: Vec<&NoReadings> = run.no_readings.iter().filter(|one| !simulated || matches!(one.why, Why::Slow(_))).collect();
+    let mut kinds: Vec<Why> = Vec::new();
+    for one in &all {
+        if !kinds.contains(&one.why) {
+            kinds.push(one.why);
+        }
+    }
+    let of = |why: Why| {
+        let alike: Vec<&NoReadings> = all.iter().copied().filter(|one| one.why == why).collect();
+        let count: usize = alike.iter().map(|one| one.count).sum();
+        let names: Vec<&str> = alike.iter().map(|one| one.of.as_str()).collect();
+        let of = format!("{}{}", if simulated { "the simulation's " } else { "" }, listed(&names));
+        // A verb, of one and of more.
+        let one_or = |one: &'static str, more: &'static str| if count == 1 { one } else { more };
+        let readings = format!("{count} {} of {of}", one_or("reading", "readings"));
+        let (check, message) = match why {
             Why::AtZero => (
                 "gaps",
                 format!(
-                    "{count} positions of {of} are 0, 0, 0 to the last digit, as some trackers write a frame that they lost: taken as none; leave such cells empty"
+                    "{count} {} of {of} {} 0, 0, 0 to the last digit, as some trackers write a frame that they lost: taken as none; leave such cells empty",
+                    one_or("position", "positions"),
+                    one_or("is", "are")
                 ),
             ),
             Why::Away => (
                 "spikes",
                 format!(
-                    "{count} readings of {of} leave the motion and are back at once, which nothing that moves does: taken as none; look for errors of its bus or tracker"
+                    "{readings} {} at once, which nothing that moves does: taken as none; look for errors of its bus or tracker",
+                    one_or("leaves the motion and is back", "leave the motion and are back")
                 ),
             ),
             Why::Stalled => (
                 "duplicates",
                 format!(
-                    "{count} readings of {of} repeat the one before in the middle of a motion: taken as none; look for lost packets"
+                    "{readings} {} the one before in the middle of a motion: taken as none; look for lost packets",
+                    one_or("repeats", "repeat")
                 ),
             ),
             Why::Slow(rows) => (
                 "duplicates",
                 format!(
-                    "{of} has a new reading every {rows} rows and repeats it until then, as if it were late: the {count} repeats are taken as none; leave such cells empty"
+                    "a new reading of {of} comes every {rows} rows and is repeated until then, as if it were late: {count} {} taken as none; leave such cells empty",
+                    one_or("repeat is", "repeats are")
                 ),
             ),
         };
         DataQuality::new(check, Level::Warn, message).run(run.id.clone()).value(count as f64, "1")
     };
-    run.no_readings.iter().filter(told).map(of).collect()
+    kinds.into_iter().map(of).collect()
+}
+
+/// Columns that are named; of more the number is told.
+const NAMED: usize = 3;
+
+/// Names of columns: all of them, or the first ones.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] if names.len() <= NAMED => format!("{} and {last}", first.join(", ")),
+        _ => format!("{} and {} more columns", names[..NAMED].join(", "), names.len() - NAMED),
+    }
 }
 
 /// Torques that stand at a limit.
@@ -255,4 +286,51 @@ pub(crate) fn nominal(robot: &Robot, nominal: &Nominal, sims: &[&Motion]) -> Vec
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_that_a_slow_motion_has_not_moved_by_are_not_polled_too_fast() {
+        fn swings(t: f64) -> f64 {
+            0.1 * (0.5 * t).sin()
+        }
+        let run = |of: fn(f64) -> f64| Run::of_one_joint(&(0..4000).map(|i| of(f64::from(i) * 1e-3)).collect::<Vec<_>>());
+        // 50 mrad/s, in counts of 1 mrad: each lasts for 20 rows and more.
+        assert_eq!(repeated(&run(|t| (swings(t) * 1e3).round() * 1e-3)), None);
+        // A new value every fourth row.
+        let told = repeated(&run(|t| swings((t * 250.0).floor() / 250.0))).expect("told");
+        assert_eq!(told.check, "duplicates");
+        assert!(told.value.is_some_and(|share| (share - 75.0).abs() < 1.0), "{told:?}");
+    }
+
+    #[test]
+    fn columns_without_readings_for_one_reason_are_told_at_once() {
+        let of = |of: &str, why: Why, count: usize| NoReadings { of: of.to_owned(), why, count };
+        let run = Run {
+            no_readings: vec![
+                of("mpos_1", Why::Away, 2),
+                of("mpos_2", Why::Away, 3),
+                of("tau_1_nm", Why::Stalled, 1),
+                of("mpos_3", Why::Away, 1),
+                of("jpos_1", Why::Away, 4),
+                of("jpos_2", Why::Away, 5),
+                of("jpos_1", Why::Slow(4), 30),
+                of("jpos_2", Why::Slow(4), 31),
+            ],
+            ..Run::of_one_joint(&[0.0, 1.0])
+        };
+        let told = no_readings(&run, false);
+        let begins = |place: usize, with: &str| assert!(told[place].message.starts_with(with), "{}", told[place].message);
+        assert_eq!(told.iter().map(|one| one.value).collect::<Vec<_>>(), [Some(15.0), Some(1.0), Some(61.0)]);
+        begins(0, "15 readings of mpos_1, mpos_2, mpos_3 and 2 more columns leave the motion and are back at once");
+        begins(1, "1 reading of tau_1_nm repeats the one before");
+        begins(2, "a new reading of jpos_1 and jpos_2 comes every 4 rows");
+        // Numbers of a simulation repeat where they are rounded.
+        let told = no_readings(&run, true);
+        assert_eq!(told.len(), 1);
+        assert!(told[0].message.starts_with("a new reading of the simulation's jpos_1 and jpos_2 comes"));
+    }
 }

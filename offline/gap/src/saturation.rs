@@ -1,6 +1,6 @@
 //! Torques that stand at a limit: what an amplifier or a sensor cuts off is no torque that anything can be learnt from.
 
-use crate::series::range;
+use crate::series::{range, resolution};
 
 /// Fewest samples in a row at the limit.
 const LEAST: usize = 4;
@@ -55,11 +55,6 @@ pub(crate) fn of(torque: &[Vec<f64>], position: &[Vec<f64>]) -> (Vec<Saturated>,
         found.push(Saturated { joint, limits, share, left_out });
     }
     (found, rows)
-}
-
-/// Smallest step between two samples that differ.
-fn resolution(series: &[f64]) -> f64 {
-    series.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
 }
 
 /// Stretches of at least [`LEAST`] samples that have this very value.

@@ -46,3 +46,8 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     let at = (share * (values.len() - 1) as f64).round() as usize;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
+
+/// Smallest step between two samples that differ; infinite where none do.
+pub(crate) fn resolution(series: &[f64]) -> f64 {
+    series.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
+}
