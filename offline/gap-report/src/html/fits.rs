@@ -1,7 +1,7 @@
 //! What a correction gains on held-out runs, as bars.
 
 use super::tags::{around, text};
-use crate::text::{as_given, capital, percent, plain_metric};
+use crate::text::{capital, in_one_unit, percent, plain_metric};
 use crate::{ABSENT, Fit, Metric, Space};
 
 /// One figure before, after and by noise alone.
@@ -10,16 +10,17 @@ pub(super) fn fit(fit: &Fit) -> String {
     let mut out = text("p", "name", &capital(&fit.quantity)) + &text("p", "how", &how);
     let least_is_best = !matches!(fit.metric, Metric::R2 | Metric::LogLikelihoodPerSample);
     let most = [fit.before, fit.after].into_iter().chain(fit.noise_floor).fold(0.0_f64, f64::max);
-    let bar = |name: &str, class: &str, value: f64| {
+    let bar = |name: &str, class: &str, value: f64, said: &str| {
         let width = if most > 0.0 { (100.0 * value / most).clamp(0.0, 100.0) } else { 0.0 };
         format!(
             "{}<span class=\"t\" aria-hidden=\"true\"><i class=\"{class}\" style=\"width:{width:.1}%\"></i></span>{}",
             text("span", "l", name),
-            text("span", "n", &as_given(value, &fit.unit))
+            text("span", "n", said)
         )
     };
-    let floor = fit.noise_floor.map_or_else(String::new, |floor| bar("noise alone", "noise", floor));
-    let bars = bar("before", "before", fit.before) + &bar("after", "after", fit.after) + &floor;
+    let [before, after, noise] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
+    let floor = fit.noise_floor.map_or_else(String::new, |floor| bar("noise alone", "noise", floor, &noise));
+    let bars = bar("before", "before", fit.before, &before) + &bar("after", "after", fit.after, &after) + &floor;
     out += &around("div", "bars", &bars);
     if let Some(gone) = fit.removed_fraction.filter(|_| least_is_best) {
         let interval = fit.removed_fraction_ci95.map_or_else(String::new, |[low, high]| {

@@ -1,8 +1,8 @@
 //! The top: what was compared, the answer in words, the figures that matter.
 
 use super::tags::{around, text};
-use crate::text::{as_given, capital, duration, headlines_unbroken, joined, percent, probability, short, written};
-use crate::{Fit, Level, Physics, Report, RunRole, Status};
+use crate::text::{as_given, capital, duration, headlines_unbroken, in_one_unit, percent, probability};
+use crate::{Level, Physics, Report, RunRole, Status};
 
 /// What was compared, the answer's mark and its sentences.
 pub(super) fn head(report: &Report) -> String {
@@ -50,13 +50,15 @@ pub(super) fn tiles(report: &Report) -> String {
         if let Some(gone) = fit.removed_fraction {
             tiles.push(Tile::new("Removable error gone", percent(gone), "on held-out runs"));
         }
-        let floor = fit.noise_floor.map_or_else(String::new, |floor| format!("noise alone {}", as_given(floor, &fit.unit)));
-        tiles.push(Tile::new(&capital(&fit.quantity), change(fit), &floor));
+        let [before, after, floor] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
+        let floor = fit.noise_floor.map_or_else(String::new, |_| format!("noise alone {floor}"));
+        tiles.push(Tile::new(&capital(&fit.quantity), format!("{before} \u{2192} {after}"), &floor));
     } else if let Some(worst) = report.mismatch.excess_rms.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
         let name = format!("Largest beyond noise{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
-        let of_model = worst.model_error().map(|own| format!(", the model\u{2019}s own error {}", as_given(own, &worst.unit)));
-        let floor = format!("noise alone {}{}", as_given(worst.noise_floor, &worst.unit), of_model.unwrap_or_default());
-        tiles.push(Tile::new(&name, as_given(worst.value, &worst.unit), &floor));
+        let own = worst.model_error();
+        let [value, floor, missed] = in_one_unit([worst.value, worst.noise_floor, own.unwrap_or(0.0)], &worst.unit);
+        let of_model = own.map_or_else(String::new, |_| format!(", the model\u{2019}s own error {missed}"));
+        tiles.push(Tile::new(&name, value, &format!("noise alone {floor}{of_model}")));
     }
     let mut resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);
     if let Some(effect) = resolution.find_map(|test| test.effect.as_ref()) {
@@ -103,9 +105,4 @@ impl Tile {
 
 fn ratio(excess: &crate::ExcessRms) -> f64 {
     excess.value / excess.noise_floor
-}
-
-/// `13.4 → 3.10 N`.
-fn change(fit: &Fit) -> String {
-    joined(&format!("{} \u{2192} {}", short(fit.before), short(fit.after)), &written(&fit.unit))
 }

@@ -4,7 +4,7 @@ use plot::figure::ratio_legend;
 
 use super::tags::{WIDE_PX, figure, section, table, text};
 use crate::figures::{channel_title, grouped, heat_maps, hottest};
-use crate::text::{as_given, joints, percent, short};
+use crate::text::{in_one_unit, joints, percent, short};
 use crate::{Pictures, Report, Share};
 
 /// Bars at most.
@@ -71,10 +71,11 @@ fn from_verdicts(report: &Report) -> Vec<Share> {
 fn sizes(report: &Report) -> String {
     let row = |excess: &crate::ExcessRms| {
         let place = excess.joint.as_deref().map_or_else(String::new, |joint| format!(", {}", joint.replace('_', " ")));
+        let [value, floor] = in_one_unit([excess.value, excess.noise_floor], &excess.unit);
         vec![
             format!("{}{place}", channel_title(excess.channel)),
-            as_given(excess.value, &excess.unit),
-            as_given(excess.noise_floor, &excess.unit),
+            value,
+            floor,
             format!("{} \u{d7}", short(excess.value / excess.noise_floor)),
         ]
     };

@@ -37,6 +37,13 @@ pub(crate) fn as_given(value: f64, unit: &str) -> String {
     joined(&short(value), &written(unit))
 }
 
+/// Values of the report in one multiple of their unit, that in which the largest reads best.
+pub(crate) fn in_one_unit<const N: usize>(values: [f64; N], unit: &str) -> [String; N] {
+    let largest = values.iter().filter(|value| value.is_finite()).fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let Scale { name, per_unit } = scale(largest, unit);
+    values.map(|value| joined(&short(value * per_unit), &name))
+}
+
 /// Number and unit, not to be broken between lines; no space before degrees.
 pub(crate) fn joined(number: &str, unit: &str) -> String {
     match unit {
@@ -178,6 +185,9 @@ mod tests {
         }
         assert_eq!(with_unit(0.0231, "s"), "23.1\u{a0}ms");
         assert_eq!(as_given(1.62, "mm"), "1.62\u{a0}mm");
+        assert_eq!(in_one_unit([3.5e-4, 5.86e-5], "rad"), ["350\u{a0}\u{b5}rad", "58.6\u{a0}\u{b5}rad"]);
+        assert_eq!(in_one_unit([0.925, 3.65e-3], "N.m"), ["0.925\u{a0}N\u{a0}m", "0.00365\u{a0}N\u{a0}m"]);
+        assert_eq!(in_one_unit([f64::NAN, 2.67e-6], "m"), ["unknown\u{a0}\u{b5}m", "2.67\u{a0}\u{b5}m"]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::headline::{headlines_unbroken, plain_spaces, quality_headline};
 use super::joints::{capital, joints, listed};
-use super::number::{as_given, percent, probability};
+use super::number::{as_given, in_one_unit, percent, probability};
 use super::region::region;
 use crate::{ABSENT, Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
 
@@ -59,10 +59,10 @@ fn fits(report: &Report) -> Vec<String> {
 /// `force insertion 13.4 to 3.10 N RMS, noise alone 2.70 N: 99 % of the removable error is gone`.
 fn improvement(fit: &Fit) -> String {
     let metric = plain_metric(fit.metric);
-    let floor = fit.noise_floor.map_or_else(String::new, |floor| format!(", noise alone {}", as_given(floor, &fit.unit)));
+    let [before, after, floor] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
+    let floor = fit.noise_floor.map_or_else(String::new, |_| format!(", noise alone {floor}"));
     let gone =
         fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share.min(1.0))));
-    let (before, after) = (as_given(fit.before, &fit.unit), as_given(fit.after, &fit.unit));
     let space = if fit.space == Space::ClosedLoop { " in the loop" } else { "" };
     if fit.extra.get(ABSENT).is_some() {
         return format!("{} off by {before} {metric}{floor}: nothing of it is there", fit.quantity);
@@ -104,14 +104,11 @@ fn agreement(report: &Report) -> Option<String> {
         return Some(format!("an effect of {} would have been seen", as_given(effect.value, &effect.unit)));
     }
     let worst = report.mismatch.excess_rms.iter().max_by(|a, b| (a.value / a.noise_floor).total_cmp(&(b.value / b.noise_floor)))?;
-    let (value, floor) = (as_given(worst.value, &worst.unit), as_given(worst.noise_floor, &worst.unit));
-    let of_model = |own| {
-        format!(
-            "; there the model that was learnt from the simulation misses {} of the simulation itself",
-            as_given(own, &worst.unit)
-        )
-    };
-    let of_model = worst.model_error().map_or_else(String::new, of_model);
+    let own = worst.model_error();
+    let [value, floor, missed] = in_one_unit([worst.value, worst.noise_floor, own.unwrap_or(0.0)], &worst.unit);
+    let of_model = own.map_or_else(String::new, |_| {
+        format!("; there the model that was learnt from the simulation misses {missed} of the simulation itself")
+    });
     Some(format!("largest difference beyond noise {value}, noise alone {floor}{of_model}"))
 }
 
