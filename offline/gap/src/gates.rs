@@ -126,8 +126,11 @@ fn standing(robot: &Robot, run: &Run) -> Vec<DataQuality> {
 /// Rows that repeat the one before while the robot moves by more than it resolves.
 fn repeated(run: &Run) -> Option<DataQuality> {
     let speeds: Vec<Vec<f64>> = (0..run.position.len()).map(|j| velocity(run, j)).collect();
-    let top: Vec<f64> = speeds.iter().map(|s| s.iter().fold(0.0, |m: f64, v| m.max(v.abs()))).collect();
-    let seen_from: Vec<f64> = run.position.iter().zip(&top).map(|(s, t)| (MOVING * t).max(resolution(s) / run.dt_s)).collect();
+    let seen_from = |(position, speed): (&Vec<f64>, &Vec<f64>)| {
+        let top = speed.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        (MOVING * top).max(resolution(position) / run.dt_s)
+    };
+    let seen_from: Vec<f64> = run.position.iter().zip(&speeds).map(seen_from).collect();
     let moving = |i: usize| speeds.iter().zip(&seen_from).any(|(s, least)| s[i].abs() > *least);
     let same = |i: usize| run.position.iter().all(|s| s[i] == s[i - 1]);
     let count = (1..run.len()).filter(|&i| moving(i)).count().max(1);

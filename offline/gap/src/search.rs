@@ -127,7 +127,7 @@ struct Judged {
     gain: Gain,
     /// Largest share of a cell that it removes.
     share: f64,
-    /// Is it alone, and most of what it explains there where the nominal model is wrong by far more?
+    /// Does it begin or end on the way, alone, and is most of what it explains there where the nominal model is wrong by far more?
     of_the_model: bool,
     /// Its RMS over the largest other effect's where it removes as much as is asked; infinite beside nothing.
     amplitude: f64,
@@ -297,7 +297,7 @@ impl Search<'_, '_> {
         };
         let enough =
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
-        let of_the_model = others.is_empty() && {
+        let of_the_model = others.is_empty() && scored.candidate.edges() > 0 && {
             let (with, without) = (self.scorer.left(&grams, &after), self.scorer.left(base, &before));
             // What it explains, in units of what it leaves of the cell, and what of that is within a miss of the model.
             let explained = |c: usize| {
@@ -372,13 +372,12 @@ impl Search<'_, '_> {
         // In a window it is met for as long as that lasts; a wall is met seldom all the same.
         let family = &scored.candidate.family;
         let seldom = SELDOM.contains(&family.physics) && (scored.candidate.edges() == 0 || family.form == WALL);
-        let comes = scored.candidate.edges() > 0;
-        let short = alone && comes && scored.candidate.columns.len() <= FEW && judged.gain.least > SURE;
+        let short = alone && scored.candidate.edges() > 0 && scored.candidate.columns.len() <= FEW && judged.gain.least > SURE;
         judged.gain.nats - price(&scored.candidate) >= self.thresholds.nats
             && judged.gain.least >= 0.5 * self.thresholds.nats
             && (is_met_often(&judged.gain) || seldom || short)
             && judged.amplitude >= 0.0
-            && !(comes && judged.of_the_model)
+            && !judged.of_the_model
             && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
     }
 

@@ -1,7 +1,7 @@
 //! What a correction gains on held-out runs, as bars.
 
 use super::tags::{around, text};
-use crate::text::{capital, in_one_unit, percent, plain_metric};
+use crate::text::{before_and_after, capital, percent, plain_metric};
 use crate::{ABSENT, Fit, Metric, Space};
 
 /// One figure before, after and by noise alone.
@@ -18,8 +18,8 @@ pub(super) fn fit(fit: &Fit) -> String {
             text("span", "n", said)
         )
     };
-    let [before, after, noise] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
-    let floor = fit.noise_floor.map_or_else(String::new, |floor| bar("noise alone", "noise", floor, &noise));
+    let ([before, after], noise) = before_and_after(fit);
+    let floor = fit.noise_floor.zip(noise).map_or_else(String::new, |(floor, said)| bar("noise alone", "noise", floor, &said));
     let bars = bar("before", "before", fit.before, &before) + &bar("after", "after", fit.after, &after) + &floor;
     out += &around("div", "bars", &bars);
     if let Some(gone) = fit.removed_fraction.filter(|_| least_is_best) {

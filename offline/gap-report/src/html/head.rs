@@ -1,7 +1,7 @@
 //! The top: what was compared, the answer in words, the figures that matter.
 
 use super::tags::{around, text};
-use crate::text::{as_given, capital, duration, headlines_unbroken, in_one_unit, percent, probability};
+use crate::text::{as_given, before_and_after, beside_noise, capital, duration, headlines_unbroken, percent, probability};
 use crate::{Level, Physics, Report, RunRole, Status};
 
 /// What was compared, the answer's mark and its sentences.
@@ -50,14 +50,13 @@ pub(super) fn tiles(report: &Report) -> String {
         if let Some(gone) = fit.removed_fraction {
             tiles.push(Tile::new("Removable error gone", percent(gone), "on held-out runs"));
         }
-        let [before, after, floor] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
-        let floor = fit.noise_floor.map_or_else(String::new, |_| format!("noise alone {floor}"));
+        let ([before, after], floor) = before_and_after(fit);
+        let floor = floor.map_or_else(String::new, |floor| format!("noise alone {floor}"));
         tiles.push(Tile::new(&capital(&fit.quantity), format!("{before} \u{2192} {after}"), &floor));
     } else if let Some(worst) = report.mismatch.excess_rms.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
         let name = format!("Largest beyond noise{}", worst.joint.as_ref().map_or_else(String::new, |joint| format!(", {joint}")));
-        let own = worst.model_error();
-        let [value, floor, missed] = in_one_unit([worst.value, worst.noise_floor, own.unwrap_or(0.0)], &worst.unit);
-        let of_model = own.map_or_else(String::new, |_| format!(", the model\u{2019}s own error {missed}"));
+        let ([value, floor], missed) = beside_noise(worst);
+        let of_model = missed.map_or_else(String::new, |missed| format!(", the model\u{2019}s own error {missed}"));
         tiles.push(Tile::new(&name, value, &format!("noise alone {floor}{of_model}")));
     }
     let mut resolution = report.told().filter(|verdict| verdict.physics == Physics::None).flat_map(|verdict| &verdict.evidence);

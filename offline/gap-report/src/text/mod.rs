@@ -15,7 +15,10 @@ pub use words::words;
 
 pub(crate) use headline::headlines_unbroken;
 pub(crate) use joints::{capital, joint, joints, listed};
-pub(crate) use number::{Estimate, as_given, count, duration, in_one_unit, percent, probability, short, significance, with_unit};
+pub(crate) use number::{
+    Estimate, as_given, before_and_after, beside_noise, count, duration, in_one_unit, percent, probability, short, significance,
+    with_unit,
+};
 pub(crate) use parameter::parameter_name;
 pub(crate) use region::region;
 pub(crate) use unit::{Scale, scale, written};

@@ -3,6 +3,7 @@
 use plot::figure::number as fixed;
 
 use super::unit::{Scale, scale, written};
+use crate::{ExcessRms, Fit};
 
 /// A value with three significant digits; `unknown` for one that is not finite.
 pub(crate) fn short(value: f64) -> String {
@@ -42,6 +43,19 @@ pub(crate) fn in_one_unit<const N: usize>(values: [f64; N], unit: &str) -> [Stri
     let largest = values.iter().filter(|value| value.is_finite()).fold(0.0, |largest: f64, value| largest.max(value.abs()));
     let Scale { name, per_unit } = scale(largest, unit);
     values.map(|value| joined(&short(value * per_unit), &name))
+}
+
+/// What a figure is before and after, and by noise alone where that is known, in one multiple of its unit.
+pub(crate) fn before_and_after(fit: &Fit) -> ([String; 2], Option<String>) {
+    let [before, after, floor] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
+    ([before, after], fit.noise_floor.map(|_| floor))
+}
+
+/// What is beyond noise, noise alone, and the model's own error where that is the reason, in one multiple of their unit.
+pub(crate) fn beside_noise(excess: &ExcessRms) -> ([String; 2], Option<String>) {
+    let own = excess.model_error();
+    let [value, floor, missed] = in_one_unit([excess.value, excess.noise_floor, own.unwrap_or(0.0)], &excess.unit);
+    ([value, floor], own.map(|_| missed))
 }
 
 /// Number and unit, not to be broken between lines; no space before degrees.

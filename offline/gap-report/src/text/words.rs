@@ -2,7 +2,7 @@
 
 use super::headline::{headlines_unbroken, plain_spaces, quality_headline};
 use super::joints::{capital, joints, listed};
-use super::number::{as_given, in_one_unit, percent, probability};
+use super::number::{as_given, before_and_after, beside_noise, percent, probability};
 use super::region::region;
 use crate::{ABSENT, Experiment, Fit, Level, Metric, Physics, Report, Space, Status, Verdict};
 
@@ -59,8 +59,8 @@ fn fits(report: &Report) -> Vec<String> {
 /// `force insertion 13.4 to 3.10 N RMS, noise alone 2.70 N: 99 % of the removable error is gone`.
 fn improvement(fit: &Fit) -> String {
     let metric = plain_metric(fit.metric);
-    let [before, after, floor] = in_one_unit([fit.before, fit.after, fit.noise_floor.unwrap_or(0.0)], &fit.unit);
-    let floor = fit.noise_floor.map_or_else(String::new, |_| format!(", noise alone {floor}"));
+    let ([before, after], floor) = before_and_after(fit);
+    let floor = floor.map_or_else(String::new, |floor| format!(", noise alone {floor}"));
     let gone =
         fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share.min(1.0))));
     let space = if fit.space == Space::ClosedLoop { " in the loop" } else { "" };
@@ -104,9 +104,8 @@ fn agreement(report: &Report) -> Option<String> {
         return Some(format!("an effect of {} would have been seen", as_given(effect.value, &effect.unit)));
     }
     let worst = report.mismatch.excess_rms.iter().max_by(|a, b| (a.value / a.noise_floor).total_cmp(&(b.value / b.noise_floor)))?;
-    let own = worst.model_error();
-    let [value, floor, missed] = in_one_unit([worst.value, worst.noise_floor, own.unwrap_or(0.0)], &worst.unit);
-    let of_model = own.map_or_else(String::new, |_| {
+    let ([value, floor], missed) = beside_noise(worst);
+    let of_model = missed.map_or_else(String::new, |missed| {
         format!("; there the model that was learnt from the simulation misses {missed} of the simulation itself")
     });
     Some(format!("largest difference beyond noise {value}, noise alone {floor}{of_model}"))
