@@ -173,8 +173,13 @@ impl Motion {
     /// Force of bristles that bend over a travel before they slip, of their level: `z + t zd`, where t is the time in which
     /// their vibration settles (LuGre).
     pub fn bristle(&self, joint: usize, at_link: bool, travel: f64, settling_s: f64) -> Vec<f64> {
+        self.bent(self.quick(joint, at_link), travel, settling_s)
+    }
+
+    /// The same of a velocity.
+    pub(crate) fn bent(&self, velocity: &[f64], travel: f64, settling_s: f64) -> Vec<f64> {
         let mut state = 0.0;
-        self.quick(joint, at_link)
+        velocity
             .iter()
             .map(|v| {
                 let moved = v * self.run.dt_s / travel;

@@ -10,6 +10,7 @@ use crate::linear::{dot, least_squares, solve};
 use crate::motion::{Motion, State};
 use crate::robot::Robot;
 use crate::series::rms;
+use crate::turning::Turn;
 
 /// Columns per joint beside the links' parameters: rotor inertia, viscous, Coulomb, constant.
 const DRIVE_COLUMNS: usize = 4;
@@ -26,6 +27,8 @@ pub struct Nominal {
     pub inertial: Vec<f64>,
     /// Per joint: rotor inertia, viscous, Coulomb, constant, at the joint.
     pub drives: Vec<[f64; DRIVE_COLUMNS]>,
+    /// Per drive, how its dry friction turns round.
+    pub turns: Vec<Turn>,
     /// Per drive, in units of its joint: compliance of its cable (rad per N·m or m per N), and a constant.
     pub compliance: Vec<[f64; 2]>,
     /// Per joint: friction behind the cable, viscous and dry, which loads the cable beside the link.
@@ -62,6 +65,7 @@ impl Nominal {
         Self {
             inertial,
             drives: robot.drives.iter().map(|d| [known(d.rotor_inertia), d.viscous, d.coulomb, 0.0]).collect(),
+            turns: vec![Turn::Steep; n],
             compliance: robot.drives.iter().map(|d| [1.0 / d.stiffness, 0.0]).collect(),
             link_friction: vec![[0.0; 2]; n],
             link_sign_width: vec![None; n],
@@ -87,6 +91,11 @@ impl Nominal {
         for _ in 0..ROUNDS {
             nominal.learn_deflection(robot, runs);
             nominal.learn_torque(robot, runs, springs);
+            // Noise of a recording passes for a law by which friction turns round.
+            if !springs {
+                nominal.turns = Turn::learn(robot, &nominal, runs);
+                nominal.learn_torque(robot, runs, springs);
+            }
         }
         nominal.learn_deflection(robot, runs);
         nominal
@@ -126,7 +135,7 @@ impl Nominal {
         let mut row = vec![0.0; width];
         for run in runs {
             let Some(torque) = &run.torque else { continue };
-            let signs: Vec<Vec<f64>> = (0..n).map(|j| sign_series(run, j)).collect();
+            let signs: Vec<Vec<f64>> = (0..n).map(|j| self.dry_sign(run, j)).collect();
             let shares = robot.strain_shares();
             for &i in &run.rows {
                 let state = run.link(i);
@@ -196,6 +205,11 @@ impl Nominal {
         self.torque_error = self.torque_left(robot, runs);
     }
 
+    /// Sign of a drive's dry friction along a run, as it turns round and smoothed.
+    pub fn dry_sign(&self, run: &Motion, drive: usize) -> Vec<f64> {
+        self.turns[drive].along(run, drive)
+    }
+
     fn torque_left(&self, robot: &Robot, runs: &[&Motion]) -> Vec<f64> {
         let mut evaluator = Evaluator::new(robot, self);
         let n = robot.joint_count();
@@ -203,7 +217,7 @@ impl Nominal {
         let mut left = vec![Vec::new(); n];
         for run in runs {
             let Some(torque) = &run.torque else { continue };
-            let signs: Vec<Vec<f64>> = (0..n).map(|j| sign_series(run, j)).collect();
+            let signs: Vec<Vec<f64>> = (0..n).map(|j| self.dry_sign(run, j)).collect();
             for &i in &run.rows {
                 let load = evaluator.load(run, i);
                 for j in 0..n {

@@ -4,9 +4,9 @@ use arm::serial::Workspace;
 
 use crate::cell::{Cell, Channel, zero_at};
 use crate::motion::Motion;
-use crate::nominal::{Evaluator, Load, Nominal, sign_series};
+use crate::nominal::{Evaluator, Load, Nominal};
 use crate::nuisance::Nuisance;
-use crate::pair::{Frames, Pair, held};
+use crate::pair::{Frames, Pair};
 use crate::robot::Robot;
 use crate::series::{noise_of, rms};
 use crate::shaking::Shaking;
@@ -170,7 +170,8 @@ impl<'a> Problem<'a> {
         let mut cell = Cell::new(Channel::JointTorque, j);
         for (r, pair) in self.pairs.iter().enumerate() {
             let expected = |motion: &Motion, loads: &[Load]| -> Vec<f64> {
-                let signs: Vec<(f64, Vec<f64>)> = dry.iter().map(|(d, coulomb)| (*coulomb, sign_series(motion, *d))).collect();
+                let signs: Vec<(f64, Vec<f64>)> =
+                    dry.iter().map(|(d, coulomb)| (*coulomb, self.nominal.dry_sign(motion, *d))).collect();
                 let friction = |i: usize| signs.iter().map(|(coulomb, s)| coulomb * s[i]).sum::<f64>();
                 pair.real.rows.iter().zip(loads).map(|(&i, load)| load.motor[j] + friction(i)).collect()
             };
@@ -178,18 +179,19 @@ impl<'a> Problem<'a> {
             let mut residual: Vec<f64> =
                 pair.real.rows.iter().zip(expected(&pair.real, &self.loads[r])).map(|(&i, e)| torque[i] - e).collect();
             let first_row = cell.rows.len();
+            let mut noise = 0.0;
             if let (Some(sim), Some(loads)) = (&pair.sim, &sim_loads[r])
                 && let Some(torque) = &sim.torque
             {
                 let own: Vec<f64> = pair.real.rows.iter().zip(expected(sim, loads)).map(|(&i, e)| torque[j][i] - e).collect();
                 residual.iter_mut().zip(&own).for_each(|(out, own)| *out -= own);
-                let noise = noise_of(&residual, |_, _| true);
+                noise = noise_of(&residual, |_, _| true);
                 cell.silent.extend(self.shaking[r].rows(&own, pair, j, noise).map(|k| first_row + k));
                 cell.missed.resize(first_row, 0.0);
                 cell.missed.extend(own);
             }
             for motion in std::iter::once(&pair.real).chain(&pair.sim) {
-                for held in dry.iter().map(|(d, _)| held(motion, *d)) {
+                for held in dry.iter().map(|(d, coulomb)| self.nominal.turns[*d].unknown(motion, *d, noise / coulomb.abs())) {
                     let first = cell.rows.len();
                     let silent = pair.real.rows.iter().enumerate().filter(|(_, i)| held[**i]);
                     cell.silent.extend(silent.map(|(k, _)| first + k));
@@ -315,8 +317,9 @@ impl<'a> Problem<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cell, Channel, held};
+    use super::{Cell, Channel};
     use crate::motion::{Band, Motion};
+    use crate::pair::held;
     use crate::run::Run;
 
     #[test]

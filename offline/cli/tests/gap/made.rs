@@ -41,6 +41,15 @@ fn is_named_alone(seed: u64, id: &str, physics: &str, joint: &str) {
     assert_eq!(primary(&report).len(), 1, "{}", report.summary);
 }
 
+#[test]
+fn small_effects_on_an_arm_that_mostly_stands_have_their_own_names() {
+    // What friction that turns round too steeply left passed for a contact, warmth or dry friction, or had no name.
+    is_named_alone(2_519_786_717, "9999238834d3", "viscous_friction", "shoulder");
+    is_named_alone(2_519_786_717, "eb59273ab247", "load_dependent_friction", "elbow");
+    is_named_alone(2_519_786_717, "fd8f29e9ddbf", "coulomb_friction", "elbow");
+    is_named_alone(2_519_786_717, "fdf9e61a29b7", "motor_torque_scale", "insertion");
+}
+
 /// A signal that is late by so many seconds from a time on.
 fn late(signal: &str, by_s: f64, from_s: f64) -> Wanted {
     Wanted { signal: Some(signal.to_owned()), interval: Some([from_s, 120.0]), ..wanted("measurement_delay", None, &[("d", by_s)]) }

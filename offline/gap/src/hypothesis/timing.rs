@@ -3,7 +3,6 @@
 use super::dictionary::Dictionary;
 use super::{Bound, Column, Family};
 use crate::cell::Channel;
-use crate::nominal::sign_series;
 
 /// Least delay of a torque, late or early, s: it is given once a millisecond, and what is less than half of that is how two motions are looked at.
 const LEAST_LATE_S: f64 = 5e-4;
@@ -83,7 +82,8 @@ fn simulated(dictionary: &Dictionary, run: usize, joint: usize) -> (Vec<f64>, Ve
     let sim = pair.sim.as_ref().unwrap_or(&pair.real);
     let coulomb = dictionary.problem.nominal.drives[joint][2];
     let torque = &sim.torque.as_ref().expect("there are residuals of torque")[joint];
-    let loads: Vec<f64> = torque.iter().zip(sign_series(sim, joint)).map(|(torque, sign)| torque - coulomb * sign).collect();
+    let loads: Vec<f64> =
+        torque.iter().zip(dictionary.problem.nominal.dry_sign(sim, joint)).map(|(torque, sign)| torque - coulomb * sign).collect();
     ((0..loads.len()).map(|i| i as f64).collect(), loads)
 }
 
@@ -97,7 +97,7 @@ fn late_torque(dictionary: &Dictionary, late_s: f64, source: Source, of: impl Fn
         let mut slope = Vec::with_capacity(dictionary.grid.len());
         for (r, pair) in problem.pairs.iter().enumerate() {
             let motion = &pair.real;
-            let sign = sign_series(motion, j);
+            let sign = problem.nominal.dry_sign(motion, j);
             let every: Vec<f64> = (0..sign.len()).map(|i| i as f64).collect();
             let (places, loads) = source(dictionary, r, j);
             let torque = |at: f64| of(between(&places, &loads, at), coulomb * between(&every, &sign, at));
