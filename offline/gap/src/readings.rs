@@ -5,6 +5,8 @@ use crate::series::{quantile, rms};
 
 /// Longest excursion that no motion makes, s; a single reading is one at any rate.
 const AWAY_S: f64 = 0.005;
+/// The same of one that bends at each of its readings as much as a jump, in longest excursions.
+const JAGGED: usize = 4;
 /// A jump that no motion makes, of the difference that 95 % of the steps do not have from the one before.
 const JUMP: f64 = 4.0;
 /// An excursion comes back to where it left, but for this share of itself.
@@ -146,8 +148,9 @@ fn away(series: &[f64], dt_s: f64, kind: Kind) -> Vec<usize> {
     if out.len() as f64 > RARE * values.len() as f64 { Vec::new() } else { out }
 }
 
-/// Where a series is back that jumps away at a reading, after so many readings at most, or so many if the later ones are one value, as of a word
-/// that is wrong for a while. (A motion that bends lies on the other side of the line between two of its places than one that jumps.)
+/// Where a series is back that jumps away at a reading, after so many readings at most; some times as many if it bends at each, as of many words in a
+/// row that are wrong; or so many if the later ones are one value, as of one that is wrong for a while. (A motion that bends lies on the other side of
+/// the line between two of its places than one that jumps.)
 fn is_back(values: &[f64], i: usize, [longest, held]: [usize; 2], least: f64) -> Option<usize> {
     let before = values[i - 1] - values[i - 2];
     let jump = values[i] - values[i - 1] - before;
@@ -155,7 +158,8 @@ fn is_back(values: &[f64], i: usize, [longest, held]: [usize; 2], least: f64) ->
         return None;
     }
     let same = values.get(i + longest - 1).map_or(0, |word| values[i + longest..].iter().take_while(|x| *x == word).count());
-    let last = (i + (longest + same).min(held)).min(values.len() - 2);
+    let jagged = values[i - 1..].windows(3).take_while(|w| (w[2] - 2.0 * w[1] + w[0]).abs() > least).count();
+    let last = (i + (longest + same).min(held).max(jagged.min(JAGGED * longest))).min(values.len() - 2);
     (i + 1..=last).find(|&back| {
         let after = values[back + 1] - values[back];
         let off = |k: usize| values[k] - values[i - 1] - (k + 1 - i) as f64 * 0.5 * (before + after);
@@ -313,6 +317,23 @@ mod tests {
         let rows: Vec<usize> = (0..series.len()).filter(|i| set[0][*i].is_nan()).collect();
         assert_eq!(why.iter().map(|one| one.count).sum::<usize>(), rows.len());
         (rows, why.iter().map(|one| one.why).collect())
+    }
+
+    #[test]
+    fn many_wrong_readings_in_a_row_are_none_though_one_of_them_is_right() {
+        // As a torque was read: seven rows, the fourth of which is right.
+        let mut series: Vec<f64> = motion().iter().zip(noise(6000)).map(|(x, e)| 0.01 * x + 5e-4 * e).collect();
+        for (row, by) in [(3000, 0.44), (3001, 0.07), (3002, 0.21), (3004, 0.15), (3005, 0.35), (3006, -0.31)] {
+            series[row] += by;
+        }
+        let mut set = [series];
+        let why = without_false(&mut set, 0.001, "tau_3_nm", Kind::Force);
+        assert_eq!(why, [NoReadings { of: "tau_3_nm".to_owned(), why: Why::Away, count: 7 }]);
+        assert!(set[0][3000..3007].iter().all(|x| x.is_nan()));
+        // A push that comes and goes within as long is something: its readings go one way, then the other.
+        let pushed = |i: usize| if (3000..3012).contains(&i) { (6.0 - (i as f64 - 3006.0).abs()) * 0.05 } else { 0.0 };
+        let mut set = [motion().iter().enumerate().map(|(i, x)| 0.01 * x + pushed(i)).collect::<Vec<f64>>()];
+        assert_eq!(without_false(&mut set, 0.001, "tau_3_nm", Kind::Force), []);
     }
 
     #[test]
