@@ -92,8 +92,9 @@ impl Nominal {
             nominal.learn_deflection(robot, runs);
             nominal.learn_torque(robot, runs, springs);
             // Noise of a recording passes for a law by which friction turns round.
-            if !springs {
-                nominal.turns = Turn::learn(robot, &nominal, runs);
+            let turns = if springs { nominal.turns.clone() } else { Turn::learn(robot, &nominal, runs) };
+            if turns != nominal.turns {
+                nominal.turns = turns;
                 nominal.learn_torque(robot, runs, springs);
             }
         }

@@ -179,13 +179,15 @@ impl<'a> Problem<'a> {
             let mut residual: Vec<f64> =
                 pair.real.rows.iter().zip(expected(&pair.real, &self.loads[r])).map(|(&i, e)| torque[i] - e).collect();
             let first_row = cell.rows.len();
-            let mut noise = 0.0;
-            if let (Some(sim), Some(loads)) = (&pair.sim, &sim_loads[r])
-                && let Some(torque) = &sim.torque
-            {
-                let own: Vec<f64> = pair.real.rows.iter().zip(expected(sim, loads)).map(|(&i, e)| torque[j][i] - e).collect();
-                residual.iter_mut().zip(&own).for_each(|(out, own)| *out -= own);
-                noise = noise_of(&residual, |_, _| true);
+            let own: Option<Vec<f64>> = pair.sim.as_ref().zip(sim_loads[r].as_ref()).and_then(|(sim, loads)| {
+                let torque = &sim.torque.as_ref()?[j];
+                Some(pair.real.rows.iter().zip(expected(sim, loads)).map(|(&i, e)| torque[i] - e).collect())
+            });
+            if let Some(own) = &own {
+                residual.iter_mut().zip(own).for_each(|(out, own)| *out -= own);
+            }
+            let noise = noise_of(&residual, |_, _| true);
+            if let Some(own) = own {
                 cell.silent.extend(self.shaking[r].rows(&own, pair, j, noise).map(|k| first_row + k));
                 cell.missed.resize(first_row, 0.0);
                 cell.missed.extend(own);

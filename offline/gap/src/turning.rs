@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn friction_is_not_known_where_a_drive_stands_and_until_its_bristles_have_forgotten_that() {
         let motion = goes_and_stands();
-        // 4e-4 rad at 0.05 rad/s is 8 ms; a hundredth of 2 is left after 5.3 times that.
+        // 4e-4 rad at 0.05 rad/s is 8 ms; a hundredth of 2 is left after 4.6 times that.
         let unknown = Turn::Travel(4e-4, 0.0).unknown(&motion, 0, 0.02);
         assert!(unknown[1050..2000].iter().all(|u| *u), "stands");
         let known_from = 2000 + unknown[2000..].iter().position(|u| !u).expect("goes on");
