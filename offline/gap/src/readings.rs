@@ -160,12 +160,14 @@ fn is_back(values: &[f64], i: usize, [longest, held]: [usize; 2], least: f64) ->
     let same = values.get(i + longest - 1).map_or(0, |word| values[i + longest..].iter().take_while(|x| *x == word).count());
     let jagged = values[i - 1..].windows(3).take_while(|w| (w[2] - 2.0 * w[1] + w[0]).abs() > least).count();
     let last = (i + (longest + same).min(held).max(jagged.min(JAGGED * longest))).min(values.len() - 2);
-    (i + 1..=last).find(|&back| {
+    let is_at = |back: usize, small: f64| {
         let after = values[back + 1] - values[back];
         let off = |k: usize| values[k] - values[i - 1] - (k + 1 - i) as f64 * 0.5 * (before + after);
-        let small = BACK * jump.abs();
         off(i) / jump > 0.5 && off(back).abs() < small && (after - before).abs() < small
-    })
+    };
+    // A smaller wrong word behind a large one is not the way back, if there is a way all the way back.
+    let roughly = BACK * jump.abs();
+    [roughly.min(least), roughly].into_iter().find_map(|small| (i + 1..=last).find(|&back| is_at(back, small)))
 }
 
 /// One place and how long it was read.
@@ -247,38 +249,41 @@ impl Levels {
     }
 
     /// Rows that repeat the one before: of what has noise, which hardly ever does, all that are not followed by a least step (there it stood);
-    /// elsewhere those in a motion that goes on.
+    /// elsewhere those in a motion that goes on. Where one stall follows another and the motion goes on over both only, the reading between them is
+    /// an old one as well.
     fn stalls(&self, set: &[Vec<f64>], dt_s: f64) -> Vec<usize> {
         let jumps: Vec<f64> = set.iter().map(|series| jump(&readings(series).1)).collect();
         let row = |level: usize| self.rows[self.all[level].first];
-        let step = |level: usize| set.iter().map(move |series| series[row(level + 1)] - series[row(level)]).collect::<Vec<_>>();
+        let step = |from: usize, to: usize| set.iter().map(move |series| series[row(to)] - series[row(from)]).collect::<Vec<_>>();
         let length = |vector: &[f64]| vector.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // Distance to the next place per row.
-        let speed = |level: usize| {
-            let rows = (row(level + 1) - row(level)) as f64;
-            step(level).into_iter().map(|x| x / rows).collect::<Vec<f64>>()
+        // Distance to another place per row.
+        let speed = |from: usize, to: usize| {
+            let rows = (row(to) - row(from)) as f64;
+            step(from, to).into_iter().map(|x| x / rows).collect::<Vec<f64>>()
         };
-        let goes_on = |level: usize| {
-            let (before, here, after) = (speed(level - 1), speed(level), speed(level + 1));
+        let goes_on = |from: usize, to: usize| {
+            let (before, here, after) = (speed(from - 1, from), speed(from, to), speed(to, to + 1));
             let mean: Vec<f64> = before.iter().zip(&after).map(|(a, b)| 0.5 * (a + b)).collect();
             let along: f64 = here.iter().zip(&mean).map(|(a, b)| a * b).sum();
             let ratio = length(&here) / length(&mean);
             along > 0.5 * length(&here) * length(&mean) && (1.0 / GOES_ON..GOES_ON).contains(&ratio)
         };
-        let in_motion = |level: usize| {
-            self.all[level].count as f64 * dt_s <= STALL_S
-                && step(level).iter().zip(&jumps).any(|(x, jump)| x.abs() > *jump)
-                && goes_on(level)
+        let in_motion = |from: usize, to: usize| {
+            let rows = self.all[from..to].iter().map(|level| level.count).sum::<usize>();
+            let jumps_from = |level: usize| step(level, level + 1).iter().zip(&jumps).any(|(x, jump)| x.abs() > *jump);
+            rows as f64 * dt_s <= STALL_S && (from..to).all(jumps_from) && goes_on(from, to)
         };
         let (last, larger) = (self.all.len().saturating_sub(2), self.larger());
-        let mut again: Vec<usize> =
+        let again: Vec<usize> =
             (1..last).filter(|level| self.all[*level].count >= STALLED && self.steps[*level] > larger).collect();
         let rows = again.iter().map(|level| self.all[*level].count).sum::<usize>() as f64;
-        if rows > RARE * self.rows.len() as f64 || !self.is_continuous() {
-            again.retain(|level| in_motion(*level));
-        }
-        let of = |level: usize| self.all[level].first + 1..self.all[level].first + self.all[level].count;
-        again.into_iter().flat_map(of).map(|k| self.rows[k]).collect()
+        let are_asked = rows > RARE * self.rows.len() as f64 || !self.is_continuous();
+        let of = |from: usize, to: usize| self.all[from].first + 1..self.all[to - 1].first + self.all[to - 1].count;
+        let alone = again.iter().filter(|level| !are_asked || in_motion(**level, **level + 1)).map(|level| of(*level, *level + 1));
+        let is_over_both = |one: usize| !(in_motion(one, one + 1) && in_motion(one + 1, one + 2)) && in_motion(one, one + 2);
+        let both =
+            again.windows(2).filter(|pair| pair[1] == pair[0] + 1 && is_over_both(pair[0])).map(|pair| of(pair[0], pair[0] + 2));
+        alone.chain(both).flatten().map(|k| self.rows[k]).collect()
     }
 }
 
@@ -351,6 +356,18 @@ mod tests {
     }
 
     #[test]
+    fn small_wrong_words_behind_a_large_one_are_none() {
+        let mut torque = noisy(0.01);
+        for (row, by) in [(3000, 6.0), (3001, 1.0), (3002, 1.2)] {
+            torque[row] += by;
+        }
+        let mut set = [torque];
+        let why = without_false(&mut set, 0.001, "tau_3_nm", Kind::Force);
+        assert_eq!(why, [NoReadings { of: "tau_3_nm".to_owned(), why: Why::Away, count: 3 }]);
+        assert!(set[0][3000..3003].iter().all(|x| x.is_nan()));
+    }
+
+    #[test]
     fn what_stays_away_or_happens_often_is_a_reading() {
         let mut steps = noisy(1e-4);
         steps[3000..].iter_mut().for_each(|x| *x += 0.1);
@@ -373,6 +390,23 @@ mod tests {
             series[3300..3330].fill(b);
             assert_eq!(taken(&series), (rows.clone(), vec![Why::Stalled]));
         }
+    }
+
+    #[test]
+    fn a_reading_between_two_stalls_that_is_an_old_one_is_none() {
+        for mut series in [noisy(1e-4), counted(&motion(), 1e-4)] {
+            // The second stall begins before the first one ends, and holds what was read then.
+            let [first, second] = [1000, 1018].map(|i| series[i]);
+            series[1000..1027].fill(first);
+            series[1027..1032].fill(second);
+            assert_eq!(taken(&series), ((1001..1032).collect(), vec![Why::Stalled]));
+        }
+        // Two stalls with a reading of that instant between them.
+        let mut series = counted(&motion(), 1e-4);
+        let [first, second] = [1000, 1027].map(|i| series[i]);
+        series[1000..1027].fill(first);
+        series[1027..1040].fill(second);
+        assert_eq!(taken(&series), ((1001..1027).chain(1028..1040).collect(), vec![Why::Stalled]));
     }
 
     #[test]

@@ -400,7 +400,8 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     let travel = dictionary.travel(j);
     // A bend in points that a camera saw is mostly play or the camera.
     let unlikely = if dictionary.problem.of_points() { 12.0 } else { 0.0 };
-    let periods = periods(travel, dictionary.problem.robot.range(j));
+    let robot = dictionary.problem.robot;
+    let periods = periods(travel, robot.range(j), least_period(robot.motor_from_joint[(j, j)]));
     for (form, carries) in [("once per turn", false), ("once per turn, torque too", true)] {
         all.push(
             Family::shaped(
@@ -426,17 +427,24 @@ fn push_geometry(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
                     vec![wave(0.0), wave(std::f64::consts::FRAC_PI_2)]
                 },
             )
-            .penalised(2.0 + unlikely),
+            // Found among so many.
+            .penalised(2.0 + (periods.len() as f64).ln() + unlikely),
         );
     }
 }
 
-/// Periods of an eccentric pulley to begin with, of a joint that travels so far of so much that it can.
-fn periods(travel: f64, range: f64) -> Vec<f64> {
+/// Periods of an eccentric pulley to begin with, none below the least, of a joint that travels so far of so much that it can.
+fn periods(travel: f64, range: f64, least: f64) -> Vec<f64> {
     let (from, to, count) = PERIODS;
     let ratio = (to / from).powf(1.0 / (count - 1) as f64);
-    let more = (range / (travel * to)).ln().max(0.0) / ratio.ln();
-    (0..count + more.ceil() as usize).map(|k| travel * from * ratio.powi(k as i32)).collect()
+    let more = (range.max(least) / (travel * to)).ln().max(0.0) / ratio.ln();
+    (0..count + more.ceil() as usize).map(|k| travel * from * ratio.powi(k as i32)).filter(|period| *period >= least).collect()
+}
+
+/// The motor's own pulley is the smallest of a cable's run, but for an idler: none turns more than twice when the motor turns once. A motor
+/// that turns with its joint is one whose drive is not known.
+fn least_period(motor_turns: f64) -> f64 {
+    if motor_turns.abs() > 1.0 { std::f64::consts::PI / motor_turns.abs() } else { 0.0 }
 }
 
 fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
