@@ -14,7 +14,8 @@ use crate::builtin::along_motion;
 use crate::found::Found;
 use crate::given::Given;
 use crate::hypothesis::{
-    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, Window, direction,
+    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, WITH_OTHER_LINKS,
+    Window, direction,
 };
 use crate::intervals::Estimate;
 use crate::known;
@@ -91,6 +92,10 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
                 }
                 if candidate.family.physics == "link_geometry" && candidate.family.form.ends_with(", torque too") {
                     left_out.push(told(candidate, "the torque that its weight asks for then is not a term of the simulator"));
+                }
+                if candidate.family.form == WITH_OTHER_LINKS {
+                    left_out
+                        .push(told(candidate, "what links add to it that are not as the file has them, which nothing else tells"));
                 }
                 if candidate.family.form == LATE_COUPLING {
                     left_out.push(told(

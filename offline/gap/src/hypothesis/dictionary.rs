@@ -125,18 +125,20 @@ impl<'a> Dictionary<'a> {
 
     /// The arm's regressor at every grid row, N×10N row-major.
     pub fn regressor(&self) -> &[Vec<f64>] {
-        self.regressor.get_or_init(|| {
-            let arm = &self.problem.robot.arm;
-            let n = self.joints();
-            let mut ws = Workspace::new(arm);
-            let at = |&(r, i, _): &(usize, usize, usize)| {
-                let state = self.problem.pairs[r].real.link(i);
-                let mut y = vec![0.0; n * n * PARAMETERS];
-                arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
-                y
-            };
-            self.grid.iter().map(at).collect()
-        })
+        self.regressor.get_or_init(|| self.regressor_of(&self.problem.robot.arm))
+    }
+
+    /// That of another arm, in the same motion.
+    pub fn regressor_of(&self, arm: &SerialArm) -> Vec<Vec<f64>> {
+        let n = self.joints();
+        let mut ws = Workspace::new(arm);
+        let at = |&(r, i, _): &(usize, usize, usize)| {
+            let state = self.problem.pairs[r].real.link(i);
+            let mut y = vec![0.0; n * n * PARAMETERS];
+            arm.regressor(&mut ws, &state.position, &state.velocity, &state.acceleration, &mut y);
+            y
+        };
+        self.grid.iter().map(at).collect()
     }
 
     /// Number of joints.

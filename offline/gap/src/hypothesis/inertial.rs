@@ -1,7 +1,7 @@
 //! Weights, links and the direction of gravity.
 
 use arm::serial::{LinkInertia, PARAMETERS};
-use nalgebra::{DMatrix, Rotation3, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::dictionary::Dictionary;
 use super::{Bound, Family};
@@ -72,7 +72,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         );
         all.push(family.penalised(4.0 + altered));
     }
-    push_gravity(all);
+    super::gravity::push(dictionary, all);
 }
 
 const TORQUE: Channel = Channel::JointTorque;
@@ -165,22 +165,4 @@ fn independent(dictionary: &Dictionary, link: usize, among: &[usize]) -> Vec<usi
         }
     }
     chosen
-}
-
-/// Gravity turned about the base's x and y, by `Exp([a, b, 0])`.
-fn push_gravity(all: &mut Vec<Family>) {
-    let bound = Bound::Between(-0.9, 0.9);
-    all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[bound, bound], &["a", "b"], |d, s| {
-        // Along the shortest way: first a, then b; a secant of nothing is a tangent.
-        let s = [s[0], s[1]].map(|x| if x.abs() < 1e-4 { 1e-4 } else { x });
-        let (first, both) = (turned_load(d, s[0], 0.0), turned_load(d, s[0], s[1]));
-        vec![d.difference(&first, d.believed(), s[0], true), d.difference(&both, &first, s[1], true)]
-    }));
-}
-
-/// Load of the links at each grid row with gravity turned.
-fn turned_load(dictionary: &Dictionary, a: f64, b: f64) -> Vec<Vec<f64>> {
-    let mut arm = dictionary.problem.robot.arm.clone();
-    arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * arm.gravity_vector());
-    dictionary.loads_of(&arm)
 }
