@@ -57,19 +57,24 @@ pub fn changed(problem: &Problem) -> Option<Changed> {
 fn at_joint(problem: &Problem, reals: &[&Motion], sims: &[&Motion], j: usize) -> Option<Changed> {
     let sim = seen(problem, sims, j)?;
     let everything: Vec<usize> = (0..sim.columns.len()).collect();
-    let law = fit(&sim, &sim.torque, &everything, |_| true);
+    let law = fit(&[(Part { seen: &sim, whole: true, over: 1.0 }, &sim.torque)], &everything);
     let usual = rms(without_means(&sim, &sim.torque).into_iter());
     let left = rms(missed(&sim, &sim.torque, &everything, &law).into_iter());
     let real = seen(problem, reals, j)?;
     let off: Vec<f64> = missed(&real, &real.torque, &everything, &law);
     let gains: Vec<usize> = (0..GAINS).collect();
-    let change = fit(&real, &off, &gains, |kept| !kept);
+    let change = fit(&[(Part { seen: &real, whole: false, over: 1.0 }, &off)], &gains);
     let after = missed(&real, &off, &gains, &change);
     let aside = |series: &[f64]| rms(series.iter().zip(&real.kept).filter(|(_, kept)| **kept).map(|(y, _)| *y));
     let (before, after) = (aside(&off), aside(&after));
     let told = left <= LAW * usual && before > BEYOND * left && before > LEAST * usual && after < LEFT * before;
     // Where the simulation hardly asks for a gain, that of an integral above all, its own torque says little of it: one law may hold in both.
-    let one = fit_to_both([(&sim, left), (&real, after.max(left))], &everything);
+    // Each over what its own law leaves.
+    let of_both = [
+        (Part { seen: &sim, whole: true, over: left.max(1e-300) }, &*sim.torque),
+        (Part { seen: &real, whole: false, over: after.max(left).max(1e-300) }, &*real.torque),
+    ];
+    let one = fit(&of_both, &everything);
     let of_sim = rms(missed(&sim, &sim.torque, &everything, &one).into_iter());
     let of_real = aside(&missed(&real, &real.torque, &everything, &one));
     let is_one_law = of_sim < ONE_LAW * left && of_real < ONE_LAW * after.max(left);
@@ -120,24 +125,23 @@ fn without_means(seen: &Seen, series: &[f64]) -> Vec<f64> {
     less_means(series, |k| seen.run[k])
 }
 
-/// Least squares of a series on some columns, all without their means.
-fn fit(seen: &Seen, series: &[f64], columns: &[usize], of: impl Fn(bool) -> bool) -> Vec<f64> {
-    let part = |series: &[f64]| -> Vec<f64> {
-        without_means(seen, series).into_iter().zip(&seen.kept).filter(|(_, kept)| of(**kept)).map(|(y, _)| y).collect()
-    };
-    let own: Vec<Vec<f64>> = columns.iter().map(|c| part(&seen.columns[*c])).collect();
-    least_squares(&own.iter().map(Vec::as_slice).collect::<Vec<_>>(), &part(series))
+/// What was seen, the whole or all but what is kept aside, over a number that says what it is worth.
+struct Part<'s> {
+    seen: &'s Seen,
+    whole: bool,
+    over: f64,
 }
 
-/// The same of the torques of a simulation and of a recording, each over what its own law leaves, but for what is kept aside of the latter.
-fn fit_to_both([(sim, left), (real, after)]: [(&Seen, f64); 2], columns: &[usize]) -> Vec<f64> {
-    let part = |seen: &Seen, series: &[f64], scale: f64, all: bool| -> Vec<f64> {
-        let rows = without_means(seen, series).into_iter().zip(&seen.kept);
-        rows.filter(|(_, kept)| all || !**kept).map(|(y, _)| y / scale.max(1e-300)).collect()
+/// Least squares of a series of each part on some columns, all without their means.
+fn fit(parts: &[(Part, &[f64])], columns: &[usize]) -> Vec<f64> {
+    let rows = |part: &Part, series: &[f64]| -> Vec<f64> {
+        let all = without_means(part.seen, series).into_iter().zip(&part.seen.kept);
+        all.filter(|(_, kept)| part.whole || !**kept).map(|(y, _)| y / part.over).collect()
     };
-    let both = |of: &dyn Fn(&Seen) -> &[f64]| [part(sim, of(sim), left, true), part(real, of(real), after, false)].concat();
-    let own: Vec<Vec<f64>> = columns.iter().map(|c| both(&|seen| &seen.columns[*c])).collect();
-    least_squares(&own.iter().map(Vec::as_slice).collect::<Vec<_>>(), &both(&|seen| &seen.torque))
+    let column = |c: usize| parts.iter().flat_map(|(part, _)| rows(part, &part.seen.columns[c])).collect();
+    let own: Vec<Vec<f64>> = columns.iter().map(|c| column(*c)).collect();
+    let series: Vec<f64> = parts.iter().flat_map(|(part, series)| rows(part, series)).collect();
+    least_squares(&own.iter().map(Vec::as_slice).collect::<Vec<_>>(), &series)
 }
 
 /// What a law on some columns misses of a series.

@@ -1,9 +1,10 @@
 //! Gravity that points elsewhere, `Exp([a, b, 0])` about the base's x and y.
 
-use arm::serial::PARAMETERS;
+use arm::serial::{PARAMETERS, SerialArm};
 use nalgebra::{Rotation3, Vector3};
 
 use super::dictionary::{Column, Dictionary};
+use super::inertial::TOLD_APART;
 use super::{Bound, Family};
 use crate::cell::Channel;
 use crate::series::noise_of;
@@ -13,8 +14,6 @@ const TORQUE: Channel = Channel::JointTorque;
 const FURTHEST: Bound = Bound::Between(-0.9, 0.9);
 /// Angles less than this are that large: a secant of nothing is a tangent.
 const LEAST: f64 = 1e-4;
-/// Share of a number's torque that no other one gives, from which it is told apart.
-const TOLD_APART: f64 = 0.1;
 /// The form with links that are not what the lab says.
 pub(crate) const WITH_OTHER_LINKS: &str = "turned, with other links";
 /// What a lab may be wrong by: a link's mass, as a share of it, and its centre, m.
@@ -49,25 +48,21 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 /// The torque by which links as they are believed load the joints, per unit of each angle: along the shortest way, first a, then b.
 fn turned(d: &Dictionary, s: &[f64]) -> [Column; 2] {
     let [a, b] = [s[0], s[1]].map(|x| if x.abs() < LEAST { LEAST } else { x });
-    let load = |a: f64, b: f64| {
-        let mut arm = d.problem.robot.arm.clone();
-        arm.set_gravity(rotation(a, b) * arm.gravity_vector());
-        d.loads_of(&arm)
-    };
-    let (first, both) = (load(a, 0.0), load(a, b));
+    let (first, both) = (d.loads_of(&tilted(d, a, 0.0)), d.loads_of(&tilted(d, a, b)));
     [d.difference(&first, d.believed(), a, true), d.difference(&both, &first, b, true)]
 }
 
-fn rotation(a: f64, b: f64) -> Rotation3<f64> {
-    Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0))
+fn tilted(d: &Dictionary, a: f64, b: f64) -> SerialArm {
+    let mut arm = d.problem.robot.arm.clone();
+    arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * arm.gravity_vector());
+    arm
 }
 
 /// What each of these numbers adds to that, if it is as wrong as it may be, but for what two other angles would: of these the lab's links say how
 /// large they are.
 fn of_numbers(d: &Dictionary, s: &[f64], numbers: &[Number], turned: &impl Fn(Column) -> Column) -> Vec<Column> {
     let n = d.joints();
-    let mut arm = d.problem.robot.arm.clone();
-    arm.set_gravity(rotation(s[0], s[1]) * arm.gravity_vector());
+    let arm = tilted(d, s[0], s[1]);
     let (there, here) = (d.regressor_of(&arm), d.regressor());
     let of_number = |(link, k): &Number| {
         let (at_most, first) = (most(&arm.link_inertia(*link).parameters(), *k), link * PARAMETERS + k);
@@ -112,7 +107,6 @@ fn told_apart(d: &Dictionary, weights: &Weights, about: &[f64; 2]) -> Vec<Number
 }
 
 /// What a squared value of each cell is worth: one over its noise's.
-#[derive(Clone)]
 struct Weights(Vec<f64>);
 
 impl Weights {

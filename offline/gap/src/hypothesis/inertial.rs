@@ -79,7 +79,7 @@ const TORQUE: Channel = Channel::JointTorque;
 /// How much further than the tip a payload may be from the frame of its link, m.
 const BEYOND_THE_TIP_M: f64 = 0.25;
 /// Share of a parameter's torque that no other one gives, from which it is told apart.
-const TOLD_APART: f64 = 0.1;
+pub(super) const TOLD_APART: f64 = 0.1;
 /// Share of the largest torque of a unit of any parameter below which one gives none: what is left is rounding, of right angles in a URDF too
 /// (1.57).
 const NONE_AT_ALL: f64 = 1e-3;
