@@ -231,10 +231,10 @@ pub(crate) fn run(bytes: &[u8], model: &Path, runs: usize, tight_only: bool) -> 
     Ok(tables)
 }
 
-/// The formats that whole numbers make fast, as the service runs them between two states.
+/// The formats that the service may choose, as it runs them between two states.
 fn kept_warm(network: &Network, contenders: &[Contender]) -> Vec<Contender> {
     let inputs = inputs(network);
-    [Format::I16, Format::I12, Format::I8]
+    [Format::F32, Format::I16, Format::I12, Format::I8]
         .map(|format| {
             let plan = Plan::with(network, InstructionSet::best(), format).in_one_piece();
             let name = named(&plan);
