@@ -40,6 +40,21 @@ impl Window {
         Self { sigma_s: 0.0, half: 0, weights: [vec![1.0], vec![0.0], vec![0.0]] }
     }
 
+    /// Its standard deviation, s.
+    pub fn sigma_s(&self) -> f64 {
+        self.sigma_s
+    }
+
+    /// Variance of a derivative (0, 1 or 2) behind the window of white noise of variance 1, 1/s per derivative.
+    pub fn noise_gain(&self, derivative: usize) -> f64 {
+        self.weights[derivative].iter().map(|w| w * w).sum()
+    }
+
+    /// The largest gain that a wave of any frequency has in the second derivative, 1/s².
+    pub fn steepest(&self) -> f64 {
+        if self.sigma_s > 0.0 { 2.0 * (-1.0_f64).exp() / (self.sigma_s * self.sigma_s) } else { 0.0 }
+    }
+
     /// What a step from 0 to 1 is at a time after it, s, to a hundredth: the logistic curve stands for the Gaussian's integral.
     pub fn of_a_step(&self, after_s: f64) -> f64 {
         if after_s.abs() < REACH * self.sigma_s {

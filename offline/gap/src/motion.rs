@@ -49,6 +49,11 @@ const QUICK_SIGMA_S: f64 = 0.005;
 /// Smoothing of the deflection that carries a motor's motion over to its link, s.
 const DEFLECTION_SIGMA_S: f64 = 0.05;
 
+/// Times the noise of its measured acceleration (variances) above which a link is seen to shake on its cable: of white noise at the encoders, of
+/// what the acceleration is in the quietest tenth of a run, of a wave in their counts.
+const SEEN_TO_SHAKE: [f64; 3] = [2.0, 4.0, 1.0];
+const QUIETEST: f64 = 0.1;
+
 /// One run, smoothed.
 #[derive(Debug, Clone)]
 pub struct Motion {
@@ -75,6 +80,8 @@ pub struct Motion {
     /// `A⁻¹ m - q`, smoothed.
     pub deflection: Option<Vec<Vec<f64>>>,
     slow_deflection: Option<Vec<Vec<f64>>>,
+    /// Accelerations of the motors that their links do not follow, of each joint; empty where nobody sees that.
+    shaken: Vec<Vec<f64>>,
     sign_speeds: Vec<f64>,
     /// Samples that make rows.
     pub rows: Vec<usize>,
@@ -90,10 +97,7 @@ impl Motion {
         let window = over(band.sigma_s);
         let smooth = |set: &[Vec<f64>], derivative: usize| set.iter().map(|s| window.apply(s, derivative)).collect::<Vec<_>>();
         let quick = over(QUICK_SIGMA_S.min(band.sigma_s));
-        let deflection: Option<Vec<Vec<f64>>> = run
-            .truth
-            .as_ref()
-            .map(|truth| run.position.iter().zip(truth).map(|(m, q)| m.iter().zip(q).map(|(m, q)| m - q).collect()).collect());
+        let deflection = deflection_of(&run);
         let slow = over(DEFLECTION_SIGMA_S.max(band.sigma_s));
         let margin = window.margin();
         let step = ((band.step_s / run.dt_s).round() as usize).max(1);
@@ -129,6 +133,7 @@ impl Motion {
             torque: run.torque.as_ref().map(|torque| smooth(torque, 0)),
             slow_deflection: deflection.as_ref().map(|d| d.iter().map(|s| slow.apply(s, 0)).collect()),
             deflection: deflection.as_ref().map(|d| smooth(d, 0)),
+            shaken: Vec::new(),
             rows,
             tip_rows,
             window,
@@ -136,8 +141,47 @@ impl Motion {
         }
     }
 
+    /// How far the links shake on their cables, so that it is seen in the noise of the encoders: what of the second derivative of each joint's
+    /// deflection may be believed at each sample, from 0 to 1. Empty where the joints have no encoders.
+    pub fn shakes(&self) -> Vec<Vec<f64>> {
+        let (Some(truth), [white, quiet, counts]) = (&self.run.truth, SEEN_TO_SHAKE) else { return Vec::new() };
+        let slow = self.slow();
+        let of_joint = |(j, (raw, quick)): (usize, (&Vec<f64>, Vec<f64>))| {
+            let power = slow.apply(&quick.iter().map(|a| a * a).collect::<Vec<f64>>(), 0);
+            // Of white noise third differences have 20 times its variance.
+            let scatter = crate::series::rms(raw.windows(4).map(|d| d[3] - 3.0 * d[2] + 3.0 * d[1] - d[0])).powi(2) / 20.0;
+            let steps =
+                [&self.run.position[j], &truth[j]].map(|x| crate::series::resolution(x)).into_iter().filter(|q| q.is_finite());
+            let least = (white * scatter * self.window.noise_gain(2))
+                .max(quiet * crate::series::quantile(&mut power.clone(), QUIETEST))
+                .max(counts * steps.map(|q| q * q / 12.0).sum::<f64>() * self.window.steepest().powi(2));
+            power.into_iter().map(|power| if power > least { 1.0 - least / power } else { 0.0 }).collect()
+        };
+        let raw = deflection_of(&self.run).unwrap_or_default();
+        raw.iter().zip(self.quick_deflection(&raw)).enumerate().map(of_joint).collect()
+    }
+
+    /// The window of what is so slow that link and motor accelerate alike.
+    fn slow(&self) -> Window {
+        Window::new(DEFLECTION_SIGMA_S.max(self.window.sigma_s()), self.run.dt_s)
+    }
+
+    /// Second derivatives of deflections, but for what is that slow.
+    fn quick_deflection(&self, raw: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let slow = self.slow();
+        let of_joint = |d: &Vec<f64>| self.window.apply(d, 2).iter().zip(slow.apply(d, 2)).map(|(all, slow)| all - slow).collect();
+        raw.iter().map(of_joint).collect()
+    }
+
+    /// Takes off the links' acceleration what the deflections tell, as far as it is believed.
+    pub fn shake(&mut self, believed: &[Vec<f64>]) {
+        let quick = self.quick_deflection(&deflection_of(&self.run).unwrap_or_default());
+        self.shaken = quick.into_iter().zip(believed).map(|(d, b)| d.iter().zip(b).map(|(d, b)| d * b).collect()).collect();
+    }
+
     /// Position, velocity and acceleration of the links at a sample: the motors' motion, moved by the measured deflection
-    /// where there is one. (The second derivative of a joint encoder is noise; below 5 Hz link and motor accelerate alike.)
+    /// where there is one. (The second derivative of a joint encoder is noise, but where its link is seen to shake; below 5 Hz link and motor
+    /// accelerate alike.)
     pub fn link(&self, i: usize) -> State {
         let n = self.position.len();
         let at = |set: &[Vec<f64>]| (0..n).map(|j| set[j][i]).collect::<Vec<f64>>();
@@ -145,7 +189,9 @@ impl Motion {
         if let Some(slow) = &self.slow_deflection {
             position.iter_mut().zip(slow).for_each(|(q, d)| *q -= d[i]);
         }
-        State { position, velocity: at(&self.velocity), acceleration: at(&self.acceleration) }
+        let mut acceleration = at(&self.acceleration);
+        acceleration.iter_mut().zip(&self.shaken).for_each(|(a, shaken)| *a -= shaken.get(i).copied().unwrap_or(0.0));
+        State { position, velocity: at(&self.velocity), acceleration }
     }
 
     /// Samples from row to row.
@@ -202,6 +248,12 @@ impl Motion {
     }
 }
 
+/// `A⁻¹ m - q` of each joint as recorded; none where the joints have no encoders.
+fn deflection_of(run: &Run) -> Option<Vec<Vec<f64>>> {
+    let of_joint = |(m, q): (&Vec<f64>, &Vec<f64>)| m.iter().zip(q).map(|(m, q)| m - q).collect();
+    run.truth.as_ref().map(|truth| run.position.iter().zip(truth).map(of_joint).collect())
+}
+
 /// See [`Motion::sign_speed`].
 fn sign_speed(v: &[f64]) -> f64 {
     let mut steps: Vec<f64> = v.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
@@ -242,6 +294,34 @@ mod tests {
         assert_eq!(of(&[0.0, 30.0]), Band::FAST, "the first stands");
         assert_eq!(of(&[1.0, 30.0]), Band::SLOW, "the first moves slowly");
         assert_eq!(of(&[0.0, 0.0]), Band::SLOW);
+    }
+
+    #[test]
+    fn a_link_that_shakes_beyond_the_noise_is_followed_and_another_is_not() {
+        const HZ: f64 = 8.0;
+        const SIZE: f64 = 5e-4;
+        let mut random = 1_u64;
+        let mut noise = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            1.7e-4 * ((random >> 33) as f64 / f64::from(1_u32 << 31) - 0.5)
+        };
+        let wave =
+            |i: usize| if (1500..2500).contains(&i) { SIZE * (std::f64::consts::TAU * HZ * i as f64 * 1e-3).sin() } else { 0.0 };
+        let motor = swings(0.5);
+        let link = motor.iter().enumerate().map(|(i, q)| q - wave(i) + noise()).collect();
+        let mut motion = Motion::new(Run { truth: Some(vec![link]), ..Run::of_one_joint(&motor) }, Band::SLOW);
+        let of_motor: Vec<f64> = (0..4000).map(|i| motion.link(i).acceleration[0]).collect();
+        let believed = motion.shakes();
+        let mean = |of: std::ops::Range<usize>| crate::series::mean(&believed[0][of]);
+        assert!(mean(300..1200) < 0.05 && mean(1700..2300) > 0.9, "{} {}", mean(300..1200), mean(1700..2300));
+        motion.shake(&believed);
+        let rms = |of: std::ops::Range<usize>| crate::series::rms(of.map(|i| motion.link(i).acceleration[0] - of_motor[i]));
+        // What the window leaves of the wave's acceleration.
+        let rate = std::f64::consts::TAU * HZ;
+        let left = SIZE * rate * rate * (-0.5 * (rate * Band::SLOW.sigma_s).powi(2)).exp() / std::f64::consts::SQRT_2;
+        assert!((rms(1700..2300) / left - 1.0).abs() < 0.2, "{} for {left}", rms(1700..2300));
+        assert!(rms(300..1200) < 0.1 * left, "{}", rms(300..1200));
+        assert!(Motion::new(Run::of_one_joint(&motor), Band::SLOW).shakes().is_empty(), "no encoder at the joint");
     }
 
     #[test]

@@ -53,6 +53,14 @@ impl Pair {
         }
         Self { real, sim }
     }
+
+    /// The same, whose links shake on their cables: where the recording's are seen to, accelerations of both are those of the links.
+    #[must_use]
+    pub fn shaken(mut self) -> Self {
+        let believed = self.real.shakes();
+        [Some(&mut self.real), self.sim.as_mut()].into_iter().flatten().for_each(|motion| motion.shake(&believed));
+        self
+    }
 }
 
 /// Samples, at most, between two frames between which a line is drawn.

@@ -8,7 +8,7 @@ pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
 use crate::cell::Channel;
-use crate::hypothesis::{Candidate, Dictionary, Family, UNMODELLED, WALL, Windows, library, rounds};
+use crate::hypothesis::{Candidate, Dictionary, Family, RIPPLE, UNMODELLED, WALL, Windows, library, rounds, shaken};
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::Problem;
@@ -53,6 +53,10 @@ const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Share of what an effect explains that may be where the nominal model is wrong by far more, if it begins or ends on the way: in the opened
 /// cases that were looked at it is 0.44 at most of what is there, and 0.77 at least of what is none.
 const OF_THE_MODEL: f64 = 2.0 / 3.0;
+/// Share of what an effect explains beside a ripple that may be where that shakes the cable, and times the share of those rows that it may be: in the
+/// opened cases that were looked at it is 1.2 times at most of what is there, and mostly more than twice of what is none.
+const OF_A_RIPPLE: f64 = 0.5;
+const OFTENER: f64 = 1.6;
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
 const TIP_RESOLUTION: f64 = 2e-6;
 /// No encoder tells less than this of a joint (rad or m RMS); a simulation without noise does.
@@ -127,7 +131,8 @@ struct Judged {
     gain: Gain,
     /// Largest share of a cell that it removes.
     share: f64,
-    /// Does it begin or end on the way, alone, and is most of what it explains there where the nominal model is wrong by far more?
+    /// Is most of what it explains there where the nominal model is wrong: by far more, if it begins or ends on the way, alone; or since a ripple
+    /// beside it shakes the cable?
     of_the_model: bool,
     /// Its RMS over the largest other effect's where it removes as much as is asked; infinite beside nothing.
     amplitude: f64,
@@ -196,6 +201,31 @@ impl Answer<'_> {
         self.fit = self.scorer.fit(&self.grams);
         self.scorer.temper(&self.grams, &self.fit);
     }
+}
+
+/// What a candidate explains, in units of what it leaves of each cell, and what of that is at some rows; and the share of the rows that these are.
+struct Explained {
+    all: f64,
+    within: f64,
+    rows: f64,
+}
+
+/// Of residuals without and with it, per cell, and of its effects there.
+fn explained([without, with]: &[Vec<Vec<f64>>; 2], effects: &[Vec<f64>], mut some: impl FnMut(usize) -> Vec<bool>) -> Explained {
+    let mut sum = Explained { all: 0.0, within: 0.0, rows: 0.0 };
+    let mut rows = 0;
+    for c in (0..effects.len()).filter(|c| !effects[*c].is_empty()) {
+        let left = with[c].iter().map(|y| y * y).sum::<f64>().max(1e-300);
+        for ((before, after), within) in without[c].iter().zip(&with[c]).zip(some(c)) {
+            let of = (before * before - after * after) / left;
+            sum.all += of;
+            sum.within += if within { of } else { 0.0 };
+            sum.rows += f64::from(u8::from(within));
+            rows += 1;
+        }
+    }
+    sum.rows /= f64::from(rows.max(1));
+    sum
 }
 
 /// Shares of the cells' squared errors, held out, that one fit leaves out and another has.
@@ -297,18 +327,17 @@ impl Search<'_, '_> {
         };
         let enough =
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
-        let of_the_model = others.is_empty() && scored.candidate.edges() > 0 && {
-            let (with, without) = (self.scorer.left(&grams, &after), self.scorer.left(base, &before));
-            // What it explains, in units of what it leaves of the cell, and what of that is within a miss of the model.
-            let explained = |c: usize| {
-                let effect = scored.candidate.effect(c, theta);
-                let all = without[c].iter().zip(&with[c]).map(|(before, after)| before * before - after * after);
-                let left = with[c].iter().map(|y| y * y).sum::<f64>().max(1e-300);
-                let within = all.clone().zip(self.problem.is_within_a_miss(c, &effect)).filter(|(_, within)| *within);
-                [all.sum::<f64>(), within.map(|(of, _)| of).sum()].map(|of| of / left)
-            };
-            let [all, within] = (0..shares.len()).map(explained).fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
-            within > OF_THE_MODEL * all
+        let of_the_model = {
+            let effects: Vec<Vec<f64>> = (0..shares.len()).map(|c| scored.candidate.effect(c, theta)).collect();
+            let left = || [self.scorer.left(base, &before), self.scorer.left(&grams, &after)];
+            let begins_or_ends = others.is_empty() && scored.candidate.edges() > 0;
+            begins_or_ends && {
+                let explained = explained(&left(), &effects, |c| self.problem.is_within_a_miss(c, &effects[c]).collect());
+                explained.within > OF_THE_MODEL * explained.all
+            } || others.iter().filter(|other| other.family.physics == RIPPLE).any(|ripple| {
+                let explained = explained(&left(), &effects, |c| shaken(self.problem, c, ripple));
+                explained.within > explained.all * OF_A_RIPPLE.max(OFTENER * explained.rows)
+            })
         };
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
@@ -402,6 +431,7 @@ impl Search<'_, '_> {
     /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
     fn settle(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Vec<Effect> {
         let mut effects = Vec::new();
+        let mut of_a_ripple: Vec<Candidate> = Vec::new();
         let mut sweep = 0;
         'again: loop {
             sweep += 1;
@@ -421,17 +451,24 @@ impl Search<'_, '_> {
                 ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
                 let Some(first) = ranked.first() else { continue };
                 let judged = self.judged(&base, &others, first);
-                let mut accepted = self.accepts(first, &judged).then(|| (first.clone(), judged));
+                // What a ripple only seems to leave does not come in its place either.
+                let shaken = of_a_ripple.iter().any(|other| other.same_claim(&first.candidate));
+                let mut accepted = (!shaken && self.accepts(first, &judged)).then(|| (first.clone(), judged));
                 // What was accepted may stand behind what is not acceptable.
-                let own = || ranked.iter().skip(1).find(|r| r.candidate.same_claim(&chosen[k]) && r.score >= self.thresholds.nats);
+                let own = || ranked.iter().skip(1).find(|r| r.candidate.same_claim(&chosen[k]));
                 if accepted.is_none()
                     && let Some(own) = own()
                 {
                     let judged = self.judged(&base, &others, own);
-                    accepted = self.accepts(own, &judged).then(|| (own.clone(), judged));
+                    // Beside what is not acceptable it may score little, or less than nothing: what it gains is judged.
+                    let score = own.score.max(judged.gain.nats - price(&own.candidate));
+                    accepted = self.accepts(own, &judged).then(|| (Scored { score, ..own.clone() }, judged));
                 }
                 let Some((best, judged)) = accepted else {
                     trace(format!("  dropped {} {judged:.2?}", describe(first)));
+                    if judged.of_the_model && !others.is_empty() && first.candidate.same_claim(&chosen[k]) {
+                        of_a_ripple.push(chosen[k].clone());
+                    }
                     *chosen = others;
                     continue 'again;
                 };
@@ -676,7 +713,7 @@ const ALIKE: f64 = 0.03;
 /// Does a motor ripple as often as a pulley of its joint is out of true?
 fn ripples_alike(ripple: &Candidate, pulley: &Candidate, robot: &Robot) -> bool {
     let (one, other) = (&ripple.family, &pulley.family);
-    if (one.physics, other.physics) != ("torque_ripple", "pulley_eccentricity") || one.joints != other.joints {
+    if (one.physics, other.physics) != (RIPPLE, "pulley_eccentricity") || one.joints != other.joints {
         return false;
     }
     let turn = 2.0 * std::f64::consts::PI / robot.motor_from_joint[(one.joints[0], one.joints[0])].abs();

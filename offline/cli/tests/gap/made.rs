@@ -5,7 +5,7 @@ use crate::common::{
     written,
 };
 use gap_report::{Channel, RegionKind, Report, Status};
-use generator::order::{Kind, Order, Wanted};
+use generator::order::{Kind, Order, Sealed, Wanted};
 use generator::trajectory::Excitation;
 use std::path::{Path, PathBuf};
 
@@ -146,6 +146,42 @@ fn a_tilted_base_is_alone_though_links_are_not_what_the_lab_says() {
         let told: Vec<String> = primary(&report).iter().map(|v| v.physics.to_string()).collect();
         assert_eq!(told, ["gravity_direction"], "{}", report.summary);
     }
+}
+
+/// Effects of some severities, drawn by a seed.
+fn of_severity(seed: u64, label: &str, effects: &[(&str, f64)]) -> (Report, Vec<Sealed>) {
+    let folder = Folder::new(label);
+    let drawn = |(physics, severity): &(&str, f64)| Wanted { severity: Some(*severity), ..wanted(physics, None, &[]) };
+    let effects = effects.iter().map(drawn).collect();
+    let (case, truth) = written(&folder, &Order { seed, label: label.to_owned(), effects, ..Order::default() });
+    (case.judged(&folder.file("out")), truth)
+}
+
+#[test]
+fn a_motor_that_ripples_strongly_has_links_that_are_what_they_were() {
+    // It shakes the links on their cables, which the motors do not show: other links that come and go, and hysteresis, were said beside it, and
+    // of its size up to a quarter was lost.
+    for (seed, label) in [(70_019, "s19"), (70_027, "s27"), (70_067, "s67")] {
+        let (report, truth) = of_severity(seed, label, &[("torque_ripple", 30.0)]);
+        let first = named(&report, "torque_ripple", "elbow");
+        assert_eq!((report.status, primary(&report).len()), (Status::Explained, 1), "{}", report.summary);
+        holds(first, "amp", truth[0].effect.parameters["amp"], 0.05);
+    }
+    // A weight beside it was another link.
+    let (report, truth) = of_severity(50_105, "sp105", &[("torque_ripple", 30.0), ("payload", 10.0)]);
+    let told: Vec<String> = primary(&report).iter().map(|v| v.physics.to_string()).collect();
+    assert_eq!(told, ["payload", "torque_ripple"], "{}", report.summary);
+    holds(primary(&report)[0], "m_p", truth[1].effect.parameters["m_p"], 0.05);
+    holds(primary(&report)[1], "amp", truth[0].effect.parameters["amp"], 0.05);
+}
+
+#[test]
+fn play_is_told_beside_a_strong_effect_though_other_links_seem_to_fit_better() {
+    // It crosses a few times only; other links, which are not accepted, predict about as well. It was found, and dropped at the end.
+    let (report, truth) = of_severity(50_040, "sp40", &[("viscous_friction", 30.0), ("backlash", 30.0)]);
+    let told: Vec<String> = primary(&report).iter().map(|v| v.physics.to_string()).collect();
+    assert_eq!(told, ["viscous_friction", "backlash"], "{}", report.summary);
+    holds(primary(&report)[1], "b", truth[1].effect.parameters["b"], 0.05);
 }
 
 #[test]

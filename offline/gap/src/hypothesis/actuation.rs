@@ -1,13 +1,20 @@
 //! Motors: torque scale, offset and ripple.
 
 use super::dictionary::{Dictionary, size};
-use super::{Bound, Column, Family, product};
+use super::{Bound, Candidate, Column, Family, product};
 use crate::cell::Channel;
+use crate::problem::Problem;
 
 /// Speed below which a joint creeps, of its RMS speed.
 const CREEPING: f64 = 0.01;
 /// Most waves per motor turn.
 const ORDERS: u32 = 64;
+/// The physics whose wave goes with the motor's angle.
+pub(crate) const RIPPLE: &str = "torque_ripple";
+/// From so many waves per second on a cable gives way, and its link does not follow its motor as the nominal model has it,
+const SHAKES_HZ: f64 = 4.0;
+/// up to so many waves in a standard deviation of the window, behind which nothing is left of them.
+const SMOOTHED: f64 = 0.3;
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
@@ -40,7 +47,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
             let orders: Vec<f64> = (1..=ORDERS).map(f64::from).collect();
             all.push(
                 Family::shaped(
-                    "torque_ripple",
+                    RIPPLE,
                     &[j],
                     "motor turns",
                     TORQUE,
@@ -69,6 +76,17 @@ fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64>
         };
         motion.run.motor.as_ref().map_or_else(|| vec![0.0; motion.run.len()], wave)
     })
+}
+
+/// At which rows of a cell does a ripple shake the cable of its drive?
+pub(crate) fn shaken(problem: &Problem, cell: usize, ripple: &Candidate) -> Vec<bool> {
+    let j = ripple.family.joints[0];
+    let waves = ripple.shape_of("order").unwrap_or(0.0) * problem.robot.motor_from_joint[(j, j)].abs() / std::f64::consts::TAU;
+    let shakes = |&(r, i): &(usize, usize)| {
+        let motion = &problem.pairs[r].real;
+        (SHAKES_HZ..SMOOTHED / motion.window.sigma_s()).contains(&(waves * motion.drive_velocity[j][i].abs()))
+    };
+    problem.cells[cell].rows.iter().map(shakes).collect()
 }
 
 /// All that the motor gives: load, rotor, nominal friction.

@@ -13,6 +13,7 @@ mod transmission;
 mod unknown;
 mod windows;
 
+pub(crate) use actuation::{RIPPLE, shaken};
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
