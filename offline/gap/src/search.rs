@@ -2,8 +2,10 @@
 
 mod at_once;
 mod by_run;
+mod explained;
 mod likeliest;
 
+use explained::explained;
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
@@ -203,31 +205,6 @@ impl Answer<'_> {
     }
 }
 
-/// What a candidate explains, in units of what it leaves of each cell, and what of that is at some rows; and the share of the rows that these are.
-struct Explained {
-    all: f64,
-    within: f64,
-    rows: f64,
-}
-
-/// Of residuals without and with it, per cell, and of its effects there.
-fn explained([without, with]: &[Vec<Vec<f64>>; 2], effects: &[Vec<f64>], mut some: impl FnMut(usize) -> Vec<bool>) -> Explained {
-    let mut sum = Explained { all: 0.0, within: 0.0, rows: 0.0 };
-    let mut rows = 0;
-    for c in (0..effects.len()).filter(|c| !effects[*c].is_empty()) {
-        let left = with[c].iter().map(|y| y * y).sum::<f64>().max(1e-300);
-        for ((before, after), within) in without[c].iter().zip(&with[c]).zip(some(c)) {
-            let of = (before * before - after * after) / left;
-            sum.all += of;
-            sum.within += if within { of } else { 0.0 };
-            sum.rows += f64::from(u8::from(within));
-            rows += 1;
-        }
-    }
-    sum.rows /= f64::from(rows.max(1));
-    sum
-}
-
 /// Shares of the cells' squared errors, held out, that one fit leaves out and another has.
 fn shares(before: &Fit, after: &Fit) -> Vec<f64> {
     let sum = |fit: &Fit, c: usize| fit.held_out[c].iter().sum::<f64>();
@@ -327,15 +304,16 @@ impl Search<'_, '_> {
         };
         let enough =
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
-        let of_the_model = {
+        let begins_or_ends = others.is_empty() && scored.candidate.edges() > 0;
+        let ripples: Vec<&Candidate> = others.iter().filter(|other| other.family.physics == RIPPLE).collect();
+        let of_the_model = (begins_or_ends || !ripples.is_empty()) && {
             let effects: Vec<Vec<f64>> = (0..shares.len()).map(|c| scored.candidate.effect(c, theta)).collect();
-            let left = || [self.scorer.left(base, &before), self.scorer.left(&grams, &after)];
-            let begins_or_ends = others.is_empty() && scored.candidate.edges() > 0;
+            let left = [self.scorer.left(base, &before), self.scorer.left(&grams, &after)];
             begins_or_ends && {
-                let explained = explained(&left(), &effects, |c| self.problem.is_within_a_miss(c, &effects[c]).collect());
+                let explained = explained(&left, &effects, |c| self.problem.is_within_a_miss(c, &effects[c]).collect());
                 explained.within > OF_THE_MODEL * explained.all
-            } || others.iter().filter(|other| other.family.physics == RIPPLE).any(|ripple| {
-                let explained = explained(&left(), &effects, |c| shaken(self.problem, c, ripple));
+            } || ripples.into_iter().any(|ripple| {
+                let explained = explained(&left, &effects, |c| shaken(self.problem, c, ripple));
                 explained.within > explained.all * OF_A_RIPPLE.max(OFTENER * explained.rows)
             })
         };
