@@ -46,6 +46,7 @@ install:
 	sed -e 's|@VERSION@|$(VERSION)|' bridge/cmake/ravenposeConfigVersion.cmake.in > $(DESTDIR)$(PREFIX)/lib/cmake/ravenpose/ravenposeConfigVersion.cmake
 	install -m 644 models/raven2-*.toml models/gap-vocabulary.json models/gap-report.schema.json $(DESTDIR)$(PREFIX)/share/ravenpose/models/
 	install -m 644 models/examples/*.toml $(DESTDIR)$(PREFIX)/share/ravenpose/models/examples/
+	cp -R systemd $(DESTDIR)$(PREFIX)/share/ravenpose/
 	install -m 644 models/untrained.onnx models/untrained.onnx.sha256 models/raven2-worn.onnx models/raven2-worn.onnx.sha256 \
 	  models/raven2-worn-orientation.onnx models/raven2-worn-orientation.onnx.sha256 \
 	  $(DESTDIR)$(PREFIX)/share/ravenpose/models/
@@ -162,7 +163,7 @@ model: offline
 	  --out $(TRAINING)/raven2-worn-orientation.onnx
 	target/release/ravenpose evaluate --model $(TRAINING)/raven2-worn-orientation.onnx --data $(DATA) --seed 1 --out $(TRAINING)/report-orientation
 
-# Every reader of files under cargo-fuzz, FUZZ_SECONDS each.
+# Every reader of recordings under cargo-fuzz, FUZZ_SECONDS each.
 FUZZ_SECONDS ?= 600
 fuzz:
 	command -v cargo-fuzz > /dev/null || $(CARGO) install --locked cargo-fuzz

@@ -22,7 +22,9 @@ const SHOWN_MAX: usize = 60;
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("{path}: cannot read the configuration: {cause}; give the file with --config FILE")]
+    #[error(
+        "{path}: cannot read the configuration: {cause}; make it (an empty file will do, systemd/ravenposed.toml is a beginning), or give another with --config FILE"
+    )]
     Unreadable {
         /// As given.
         path: String,

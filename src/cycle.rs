@@ -117,6 +117,8 @@ struct Arm<E> {
     /// Why the hold began, kept while it lasts.
     hold_flags: u32,
     valid: bool,
+    /// Was the last message of it valid? An answer that falls back before it is sent was not.
+    shown_valid: bool,
     ever_valid: bool,
     reset_count: u32,
 }
@@ -152,6 +154,7 @@ impl<E: Estimator> Cycle<E> {
             hold: limits.good_cycles,
             hold_flags: 0,
             valid: false,
+            shown_valid: false,
             ever_valid: false,
             reset_count: 0,
         });
@@ -398,6 +401,7 @@ impl<E: Estimator> Cycle<E> {
         }
         for (arm, out) in self.arms.iter_mut().zip(&mut pose.arm) {
             if out.status == ArmStatus::Absent as u32 {
+                arm.shown_valid = false;
                 continue;
             }
             if took_ns > self.limits.budget_ns {
@@ -409,6 +413,7 @@ impl<E: Estimator> Cycle<E> {
             if reasons != 0 {
                 arm.fall_back(reasons, &self.limits, out);
             }
+            arm.shown_valid = out.status == ArmStatus::Valid as u32;
         }
         pose.late = self.counters.late;
         pose.overruns = self.counters.overruns;
@@ -459,6 +464,10 @@ impl<E: Estimator> Arm<E> {
         let mut judged = Judgement { reasons: common | reasons, information, score: -1.0 };
         let still = self.frozen.observe(state, index);
         self.is_frozen = still >= FROZEN_AFTER;
+        if self.is_frozen {
+            // What was followed since the encoders froze did not move either: the way since then is unseen, however short the rest of it.
+            self.forget();
+        }
         match still {
             FROZEN_AFTER.. => judged.reasons |= flag::INPUT_FROZEN,
             DEGRADED_AFTER.. => judged.information |= flag::DEGRADED,
@@ -527,11 +536,7 @@ impl<E: Estimator> Arm<E> {
     /// Drops to the raw pose at once; the only step that is announced instead of slewed.
     fn fall_back(&mut self, reasons: u32, limits: &Limits, out: &mut ArmPose) {
         debug_assert!(reasons & FALLBACK_REASONS == reasons);
-        let announced = self.valid;
-        if self.valid {
-            self.reset_count = self.reset_count.wrapping_add(1);
-        }
-        self.valid = false;
+        let announced = self.drop_if_shown();
         self.drop_to_zero();
         self.hold = limits.good_cycles;
         self.hold_flags |= reasons & flag::NEW_SOURCE;
@@ -542,6 +547,13 @@ impl<E: Estimator> Arm<E> {
         }
         // Before the first valid answer a reason is still a reason; `starting` means only that nothing is wrong.
         out.status = ArmStatus::Fallback as u32;
+    }
+
+    /// Ends what was valid, and counts the step that this is for whoever read the last message.
+    fn drop_if_shown(&mut self) -> bool {
+        let is_step = std::mem::take(&mut self.valid) && self.shown_valid;
+        self.reset_count = self.reset_count.wrapping_add(u32::from(is_step));
+        is_step
     }
 
     fn drop_to_zero(&mut self) {
@@ -563,12 +575,7 @@ impl<E: Estimator> Arm<E> {
     }
 
     fn disconnect(&mut self, limits: &Limits) -> ArmPose {
-        let mut flags = 0;
-        if self.valid {
-            self.reset_count = self.reset_count.wrapping_add(1);
-            flags = flag::RESET;
-        }
-        self.valid = false;
+        let flags = if self.drop_if_shown() { flag::RESET } else { 0 };
         self.drop_to_zero();
         self.hold = limits.good_cycles;
         self.frozen.reset();

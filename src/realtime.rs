@@ -41,7 +41,8 @@ pub fn lock_memory() -> Result<(), Missing> {
 pub fn pin(core: usize) -> Result<(), Missing> {
     let refused = |cause: String| Missing {
         what: format!("the loop cannot be pinned to core {core} ({cause})"),
-        remedy: "choose loop.core among the cores that `nproc --all` counts and CPUAffinity= of the unit allows".to_owned(),
+        remedy: "choose loop.core among the cores that are online and that AllowedCPUs= of the unit and its slice leaves"
+            .to_owned(),
     };
     run_on(core).map_err(|cause| refused(cause.to_string()))
 }
@@ -116,7 +117,7 @@ pub fn hold_cpu_dma_latency() -> Result<File, Missing> {
     let path = "/dev/cpu_dma_latency";
     let mut file = File::options().write(true).open(path).map_err(|cause| Missing {
         what: format!("{path} cannot be opened ({cause})"),
-        remedy: "add DeviceAllow=/dev/cpu_dma_latency rw to the unit and give the user write access, or set hold_cpu_dma_latency = false"
+        remedy: "install the drop-in ravenposed.service.d/cpu-dma-latency.conf with the udev rule that it gives, or set hold_cpu_dma_latency = false"
             .to_owned(),
     })?;
     file.write_all(&0_i32.to_ne_bytes()).map_err(|cause| Missing {

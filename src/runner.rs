@@ -270,7 +270,9 @@ impl<E: Estimator> Runner<E> {
             }
             Wait::Event => {
                 self.prepare();
-                let deadline = (now + period + period / 4).min(stale);
+                // A state that is a little late is waited for; once one is missing, an answer is given every period.
+                let late = if self.misses == 0 { period / 4 } else { 0 };
+                let deadline = (now + period + late).min(stale);
                 let mut left = deadline - now;
                 while left > 0 && !self.waiting_state() && !self.shared.stop.load(Relaxed) {
                     if let Some(listener) = self.listener() {

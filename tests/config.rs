@@ -344,9 +344,26 @@ fn files_that_cannot_be_read_are_refused() {
         (large, "10485760 bytes, more than the 1048576 allowed"),
     ];
     for (file, cause) in cases {
-        let expected = format!(": cannot read the configuration: {cause}; give the file with --config FILE");
+        let expected = format!(
+            ": cannot read the configuration: {cause}; make it (an empty file will do, systemd/ravenposed.toml is a beginning), or give another with --config FILE"
+        );
         refused(&file, &expected, &file.display().to_string());
     }
+}
+
+#[test]
+fn the_shipped_example_is_good_as_it_is_and_with_every_line_in_force() {
+    let text = include_str!("../systemd/ravenposed.toml");
+    let directory = TempDir::new("config-example");
+    let in_force = |line: &str| match line.strip_prefix('#') {
+        Some(rest) if rest.starts_with(|c: char| c == '[' || c.is_ascii_lowercase()) => format!("{rest}\n"),
+        _ => format!("{line}\n"),
+    };
+    let whole: String = text.lines().map(in_force).collect();
+    let read = |name: &str, text: &str| Config::read(&directory.file(name, text)).expect("a good configuration");
+    let (bare, full) = (read("bare.toml", text), read("full.toml", &whole));
+    assert!(bare.models.iter().all(Option::is_none) && bare.core.is_none());
+    assert!(full.models.iter().all(Option::is_some) && full.core.is_some());
 }
 
 #[test]

@@ -17,7 +17,7 @@ use ravenpose::runner::{Runner, Waiting};
 use ravenpose::shared::Shared;
 use ravenpose::{histogram, model, realtime, shared};
 use ravenpose_importer::{Activation, Network};
-use ravenpose_transport::{Reader, Settings, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, FEATURES, RavenState};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering::SeqCst};
@@ -196,24 +196,33 @@ fn million() -> ! {
 #[test]
 fn a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps() {
     if role().as_deref() == Some("minute") {
-        minute();
+        at_1_khz(Wait::Sleep, 60, &[libc::SYS_clock_nanosleep]);
     }
     let _machine = MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     nothing_happens("a_minute_at_1_khz_keeps_its_core_and_policy_and_only_sleeps", "minute");
 }
 
-fn minute() -> ! {
+#[test]
+fn five_seconds_of_waiting_for_the_bell_allocate_nothing_and_only_wait() {
+    if role().as_deref() == Some("bell") {
+        at_1_khz(Wait::Event, 5, &[libc::SYS_ppoll, libc::SYS_recvfrom]);
+    }
+    let _machine = MACHINE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    nothing_happens("five_seconds_of_waiting_for_the_bell_allocate_nothing_and_only_wait", "bell");
+}
+
+/// States of 1 kHz with their bell, and a stop of ten periods after every 500th of them: then the wait ends as the newest state becomes stale.
+fn at_1_khz(wait: Wait, seconds: u64, calls_allowed: &'static [i64]) -> ! {
     static THREAD: AtomicI32 = AtomicI32::new(0);
     static DONE: AtomicBool = AtomicBool::new(false);
     static CALLS: AtomicU64 = AtomicU64::new(u64::MAX);
-    const SECONDS: u64 = 60;
     const CORE: usize = 1;
     lock_memory_or_skip();
     let settings = Settings::from_env();
     let (ready, opened) = std::sync::mpsc::channel();
     let link = settings.clone();
     let turning = std::thread::spawn(move || {
-        let (mut runner, collector, _events, shown) = runner(&link, Wait::Sleep);
+        let (mut runner, collector, _events, shown) = runner(&link, wait);
         if let Err(missing) = realtime::pin(CORE).and_then(|()| realtime::set_fifo(80)) {
             println!("skipped: {missing}");
             std::process::exit(0);
@@ -224,20 +233,22 @@ fn minute() -> ! {
             runner.turn();
         }
         THREAD.store(thread_id(), SeqCst);
-        forbid_system_calls_but(&[libc::SYS_clock_nanosleep]);
+        forbid_system_calls_but(calls_allowed);
         let calls = allocator_calls(|| {
-            for _ in 0..(SECONDS * 1000) {
+            for _ in 0..(seconds * 1000) {
                 runner.turn();
             }
         });
         CALLS.store(calls, SeqCst);
         DONE.store(true, SeqCst);
+        // It may call no more than before, and goes on doing so until the process ends.
         loop {
-            sleep_until_ns(now_ns() + 1_000_000_000);
+            runner.turn();
         }
     });
     let (shown, mut collector) = opened.recv().expect("the loop runs");
     let writer: Writer<RavenState> = Writer::open(&settings).expect("writer");
+    let bell = Bell::open(&settings).expect("bell");
     let mut next = now_ns();
     let mut before = None;
     let mut sequence = 0;
@@ -246,23 +257,25 @@ fn minute() -> ! {
         assert!(!turning.is_finished(), "the loop ended");
         sequence += 1;
         writer.send(&state(sequence)).expect("state sent");
+        bell.ring();
         if before.is_none() && THREAD.load(SeqCst) != 0 {
             before = Some((faults_of(THREAD.load(SeqCst)), shown.counters()));
         }
         if sequence % 1000 == 0 {
             collector.collect(|set| measured.add(set));
         }
-        next = (next + 1_000_000).max(now_ns() - 1_000_000);
+        let periods = if sequence % 500 == 0 { 10 } else { 1 };
+        next = (next + periods * 1_000_000).max(now_ns() - 1_000_000);
         sleep_until_ns(next);
     }
     let after = faults_of(THREAD.load(SeqCst));
     let (before, counters_before) = before.expect("the loop warmed up");
     let accepted = shown.counters()[1] - counters_before[1];
     // How many of them a machine that stops lets through is not what is tested.
-    assert!(accepted > SECONDS * 100, "states came: {accepted}");
+    assert!(accepted > seconds * 100, "states came: {accepted}");
     let age = measured.stage(histogram::Stage::InputToOutput);
     println!(
-        "{SECONDS} s at 1 kHz: states {accepted} allocator calls {} minor faults {} major faults {}; input to output p50 {:.1} us p99.9 {:.1} us",
+        "{seconds} s at 1 kHz: states {accepted} allocator calls {} minor faults {} major faults {}; input to output p50 {:.1} us p99.9 {:.1} us",
         CALLS.load(SeqCst),
         after.0 - before.0,
         after.1 - before.1,

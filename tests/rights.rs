@@ -129,7 +129,7 @@ fn a_refused_cpu_dma_latency_alone_is_refused_too() {
     let last = text.lines().last().expect("a line");
     assert!(
         last.contains("/dev/cpu_dma_latency cannot be opened")
-            && last.contains("DeviceAllow=")
+            && last.contains("cpu-dma-latency.conf")
             && last.contains("allow_degraded = true"),
         "{last}"
     );

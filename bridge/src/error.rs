@@ -64,7 +64,7 @@ impl Code {
 
     pub(crate) fn of(error: &TransportError) -> Self {
         match error {
-            TransportError::Settings { .. } | TransportError::TooLong { .. } => Self::Argument,
+            TransportError::Settings { .. } | TransportError::Relative { .. } | TransportError::TooLong { .. } => Self::Argument,
             TransportError::Node { .. } | TransportError::Room { .. } | TransportError::Service { .. } => Self::Transport,
             TransportError::Foreign { .. } => Self::Foreign,
             TransportError::Full { .. } => Self::Full,

@@ -99,6 +99,21 @@ fn a_short_message_buffer_is_filled_and_terminated() {
 }
 
 #[test]
+fn a_root_that_depends_on_the_working_directory_is_refused() {
+    let name = prefix("relative");
+    let wrong = Options { root: c"tmp/relative".as_ptr(), ..options(&name) };
+    let mut publisher = null_mut();
+    let mut message = [0 as c_char; 200];
+    // SAFETY: valid pointers, and the buffer's own length.
+    let code = unsafe { ravenpose_publisher_open(&raw const wrong, &raw mut publisher, message.as_mut_ptr(), message.len()) };
+    // SAFETY: the call has terminated it.
+    let said = unsafe { CStr::from_ptr(message.as_ptr()) }.to_str().expect("text");
+    assert_eq!(code, Code::Argument as i32, "{said}");
+    assert!(said.contains("\"tmp/relative\" is not absolute"), "{said}");
+    assert!(publisher.is_null() && !std::path::Path::new("tmp/relative").exists());
+}
+
+#[test]
 fn one_publisher_only_and_its_place_is_free_again_after_close() {
     let name = prefix("one");
     let (mut first, mut second) = (null_mut(), null_mut());

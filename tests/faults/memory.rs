@@ -151,12 +151,18 @@ fn a_state_that_no_robot_can_have_is_not_followed_and_one_outside_the_training_i
 }
 
 #[test]
-fn while_encoders_stand_still_nothing_is_followed() {
+fn while_encoders_stand_still_nothing_is_followed_and_what_was_is_forgotten() {
+    // A short one too, though what followed before it was found and after it leave no gap of 20 ms.
+    stand_still(60);
+    stand_still(30);
+}
+
+fn stand_still(states: u32) {
     let mut bench = Bench::new();
-    let before = bench.followed();
+    let _ = bench.followed();
     let frozen = bench.next_state();
     let mut refused = 0;
-    for count in 0..60 {
+    for count in 0..states {
         let mut state = bench.next_state();
         // They stand dead, and the motor reports its speed on.
         state.enc_vals = frozen.enc_vals;
@@ -168,10 +174,8 @@ fn while_encoders_stand_still_nothing_is_followed() {
             refused += u32::from(bench.answer().arm[0].flags & flag::INPUT_FROZEN != 0);
         }
     }
-    assert!(refused > 20, "{refused}");
-    // Up to the 18th they could have been a robot's; the state of `next_state` above was never sent.
-    let after = bench.followed();
-    assert!((before + 101..=before + 101 + 18).contains(&after), "{before} {after}");
+    assert!(refused >= states / 2 - 6, "{refused}");
+    assert_eq!(bench.followed(), 101);
 }
 
 #[test]

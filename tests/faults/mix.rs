@@ -303,6 +303,7 @@ impl Checker {
                 !announced || (arm.flags & flag::RESET != 0 && correction == 0.0 && turned == 0.0),
                 "the drop is announced where it happens"
             );
+            assert!(!announced || before.status == VALID, "a step is from what was valid");
             if !announced {
                 for (quantity, (step, pace)) in [
                     (step(arm.correction_um, before.correction_um), limits.position),

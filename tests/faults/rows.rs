@@ -79,6 +79,32 @@ fn f05_a_state_that_becomes_stale_inside_the_cycle_is_not_corrected() {
 }
 
 #[test]
+fn f05_a_first_answer_that_is_held_up_is_no_step() {
+    for (took, reason) in [(5 * MS, flag::INPUT_STALE), (0, flag::STOPPING)] {
+        let mut bench = Bench::new();
+        for _ in 0..100 {
+            bench.good();
+        }
+        bench.took = took;
+        let pose = if reason == flag::STOPPING {
+            let state = bench.next_state();
+            bench.cycle.offer(&state, bench.now);
+            let mut pose = CorrectedPose::new();
+            assert!(bench.cycle.stop(bench.now, &mut pose));
+            pose
+        } else {
+            bench.good()
+        };
+        assert_fallback(&pose, reason);
+        // No valid pose was ever seen: nobody has to shift a target.
+        assert!(pose.arm.iter().all(|arm| arm.flags & flag::RESET == 0 && arm.reset_count == 0), "{pose:?}");
+        bench.took = 0;
+        let first = bench.settle();
+        assert_eq!(first.arm[0].reset_count, 0);
+    }
+}
+
+#[test]
 fn f02_a_restarted_service_is_an_announced_step_with_higher_numbers() {
     let (mut before, mut after) = (Bench::new(), Bench::new());
     before.cycle.begin_at(before.now);

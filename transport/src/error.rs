@@ -16,6 +16,12 @@ pub enum TransportError {
         /// As given.
         value: String,
     },
+    /// A root that depends on the working directory.
+    #[error("transport root {root:?} is not absolute: who starts elsewhere would meet nobody; give a path from / on")]
+    Relative {
+        /// As given.
+        root: String,
+    },
     /// Names too long for the socket that a service with `wait = "event"` listens at.
     #[error(
         "transport prefix {prefix:?} and root {root:?} together have more than the {most} bytes that wait = \"event\" leaves them; give a shorter root"

@@ -1,11 +1,13 @@
 //! A bell beside `raven/state`, for the service's event mode. Ringing costs the publisher one system call per message while somebody
 //! listens, and none while nobody does.
+//!
+//! This module contains `unsafe`: waiting for the descriptor of the listener's socket.
 
 use crate::{Settings, TransportError};
 use iceoryx2::node::Node;
 use iceoryx2::port::listener::ListenerCreateError;
 use iceoryx2::port::notifier::NotifierCreateError;
-use iceoryx2::prelude::{ServiceName, ipc};
+use iceoryx2::prelude::{FileDescriptorBased as _, ServiceName, ipc};
 use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
 use ravenpose_wire::STATE_SERVICE;
 use std::time::Duration;
@@ -71,9 +73,13 @@ impl Bell {
 /// path of one. Beside both stands a number of up to 39 digits, and `.event`.
 const NAME_MAX: usize = 108 - 39 - 6;
 
+/// Rings that are taken off at once, at most: a socket keeps no more by the kernel's default (`net.unix.max_dgram_qlen`).
+const RINGS: usize = 16;
+
 /// Waits for the bell.
 pub struct Listener {
-    listener: iceoryx2::port::listener::Listener<ipc::Service>,
+    port: iceoryx2::port::listener::Listener<ipc::Service>,
+    descriptor: i32,
     _opened: (EventFactory, Node<ipc::Service>),
 }
 
@@ -103,11 +109,66 @@ impl Listener {
             }
             _ => TransportError::service(STATE_SERVICE, settings, &cause),
         })?;
-        Ok(Self { listener, _opened: opened })
+        // SAFETY: the descriptor is only waited for, and the listener that owns it lives as long as its copy here.
+        let descriptor = unsafe { listener.file_descriptor().native_handle() };
+        let opened = Self { port: listener, descriptor, _opened: opened };
+        // The first look makes the socket one that never blocks: no later one has to.
+        opened.take_off();
+        Ok(opened)
     }
 
-    /// Waits for one ring, at most `timeout`; returns whether it rang.
+    /// Waits for a ring, at most `timeout`; returns whether it rang. Allocates nothing, and makes two system calls, one more for each further ring.
+    ///
+    /// The port's own wait has the timeout of its socket, which the kernel counts in timer ticks, and takes less than a microsecond for no timeout at all.
     pub fn wait(&self, timeout: Duration) -> bool {
-        matches!(self.listener.timed_wait_one(timeout), Ok(Some(_)))
+        let timeout = libc::timespec {
+            tv_sec: timeout.as_secs().try_into().unwrap_or(libc::time_t::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
+        let mut socket = libc::pollfd { fd: self.descriptor, events: libc::POLLIN, revents: 0 };
+        // SAFETY: one valid pollfd and a valid timespec, for the duration of the call; no signal mask.
+        let ready = unsafe { libc::ppoll(&raw mut socket, 1, &raw const timeout, std::ptr::null()) };
+        ready > 0 && self.take_off()
+    }
+
+    /// Takes off what has rung.
+    fn take_off(&self) -> bool {
+        (0..RINGS).take_while(|_| matches!(self.port.try_wait_one(), Ok(Some(_)))).count() > 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+    use std::time::Instant;
+
+    #[test]
+    fn a_wait_ends_in_its_time_however_short_and_with_a_ring() {
+        let folder = std::env::temp_dir().join(format!("rp_bell_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("folder");
+        let settings = Settings { prefix: format!("rpbell{}_", std::process::id()), root: format!("{}/", folder.display()) };
+        let (ended, waited) = mpsc::channel();
+        let own = settings.clone();
+        let waiting = std::thread::spawn(move || {
+            let listener = Listener::open(&own).expect("listener");
+            for nanos in [0, 1, 20, 400, 999, 1_000, 1_500_000] {
+                let begun = Instant::now();
+                assert!(!listener.wait(Duration::from_nanos(nanos)), "nobody rang");
+                assert!(begun.elapsed() >= Duration::from_nanos(nanos));
+                ended.send(nanos).expect("the test waits");
+            }
+            ended.send(u64::MAX).expect("the test waits");
+            listener.wait(Duration::from_mins(1))
+        });
+        for _ in 0..8 {
+            waited.recv_timeout(Duration::from_secs(20)).expect("every wait ends");
+        }
+        let bell = Bell::open(&settings).expect("bell");
+        let rang = (0..3).filter(|_| bell.ring()).count();
+        assert_eq!(rang, 3);
+        assert!(waiting.join().expect("the listener's thread"));
+        drop(bell);
+        std::fs::remove_dir_all(&folder).expect("removed");
     }
 }

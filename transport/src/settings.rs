@@ -44,6 +44,10 @@ impl Settings {
         let mut config = Config::default();
         let bad = |what: &str, value: &str| TransportError::Settings { what: what.to_owned(), value: value.to_owned() };
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| bad("prefix", &self.prefix))?;
+        // Another working directory would be another world.
+        if !self.root.starts_with('/') {
+            return Err(TransportError::Relative { root: self.root.clone() });
+        }
         config.global.set_root_path(&Path::new(self.root.as_bytes()).map_err(|_| bad("root", &self.root))?);
         // How long iceoryx2 retries on a peer's files that it cannot open, also inside `send` and `receive` (another user's files, for
         // one): half a second by default, far too long inside a controller. Opening retries by itself, see `link::retried`.
