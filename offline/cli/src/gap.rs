@@ -44,6 +44,9 @@ pub(crate) struct Wish<'a> {
     pub(crate) seconds: Option<f64>,
 }
 
+/// What is written into the folder, or removed if it is an older one.
+const WRITTEN: [&str; 3] = ["report.json", "report.html", "corrected.toml"];
+
 /// Progress is shown on a terminal, and only of what takes longer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -56,6 +59,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         ));
     }
     output::check_folder(wish.out, "--out")?;
+    let inputs: Vec<&Path> = wish.real.iter().chain(wish.sim).map(PathBuf::as_path).chain(wish.robot.map(Path::new)).collect();
+    for name in WRITTEN {
+        output::check_no_input(&wish.out.join(name), &inputs)?;
+    }
     let model = RobotModel::load(wish.robot.unwrap_or("raven2-nominal")).map_err(|error| error.to_string())?;
     let file = |path: &Path| {
         let mut notes = Vec::new();
@@ -150,7 +157,7 @@ fn write(outcome: &Outcome, out: &Path) -> Result<(), String> {
 fn watched(model: &RobotModel, given: &Given, options: &Options, out: &Path) -> Result<ExitCode, String> {
     let mut told: Option<Outcome> = None;
     let mut fault = None;
-    for end_s in watch::ends(&given.real) {
+    for end_s in watch::ends(&given.real).map_err(|error| error.to_string())? {
         let real = watch::newest(&given.real, end_s);
         let from_s = real.time_s().and_then(|time| time.first().copied()).unwrap_or(end_s);
         let sim = given.sim.as_ref().map(|(sim, hash)| (watch::newest(sim, end_s), hash.clone()));
@@ -162,18 +169,16 @@ fn watched(model: &RobotModel, given: &Given, options: &Options, out: &Path) -> 
             // A minute in which the arm stands is no end of the watch.
             Err(why) => format!("not looked at: {why}"),
         };
-        if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {said}\n")) {
-            break;
-        }
         match outcome {
             Ok(outcome) if differs(&outcome) || !told.as_ref().is_some_and(differs) => told = Some(outcome),
             Ok(_) => {}
             Err(why) => fault = Some(why),
         }
+        if !output::say(format_args!("{from_s:.0} to {end_s:.0} s: {said}\n")) {
+            break;
+        }
     }
-    let outcome = told.ok_or_else(|| {
-        fault.unwrap_or_else(|| format!("{}: has no column t_s; --watch needs the time of each row", given.real.name))
-    })?;
+    let outcome = told.ok_or_else(|| fault.unwrap_or_else(|| format!("{}: has no rows", given.real.name)))?;
     write(&outcome, out)?;
     say!("{}", out.join("report.html").display());
     Ok(status(outcome.report.status))

@@ -24,12 +24,18 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
     written
 }
 
-/// Is there a folder for a file, and does it replace none of the inputs and nothing else than a file? Asked before the work whose result it is for.
-pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
+/// Does an output replace none of the inputs?
+pub(crate) fn check_no_input(out: &Path, inputs: &[&Path]) -> Result<(), String> {
     let same = |input: &&Path| matches!((input.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b);
     if inputs.iter().any(same) {
         return Err(format!("{}: is both input and output; choose another output", out.display()));
     }
+    Ok(())
+}
+
+/// Is there a folder for a file, and does it replace none of the inputs and nothing else than a file? Asked before the work whose result it is for.
+pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
+    check_no_input(out, inputs)?;
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         return Err(format!("{}: there is no folder {}; make it first", out.display(), folder.display()));

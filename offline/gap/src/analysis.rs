@@ -99,6 +99,8 @@ fn only_taught(runs: &[Both], comparable: &[bool]) -> Option<DataQuality> {
 
 /// Least length of what is fitted on, s.
 const SHORTEST_S: f64 = 6.0;
+/// Least length of any run, s.
+const MOMENT_S: f64 = 1.0;
 /// Fewest rows of a run.
 const LEAST_ROWS: usize = 20;
 /// Of what follows the smoothing at its peak, per row of the fit and joint, a tenth to spare (`examples/resources.rs`, 20 minutes).
@@ -290,7 +292,7 @@ fn analyse_with(
                 // One as noisy as the recording is a recording of its own, whose noise would only be added.
                 let recorded = of_robot(&real, &sim);
                 from_recording |= recorded;
-                let alike = alike(&real, &sim);
+                let alike = alike(&robot, &real, &sim);
                 if recorded || !alike {
                     apart.push(sim.clone());
                 }
@@ -357,8 +359,10 @@ fn analyse_with(
     let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
     let (train, held) = split(runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
-    if train_s < SHORTEST_S || train.iter().chain(&held).any(|(run, _)| (run.len() as f64) * run.dt_s < 1.0) {
-        quality.insert(0, too_short(train_s));
+    let moment = train.iter().chain(&held).map(|(run, _)| run).find(|run| (run.len() as f64) * run.dt_s < MOMENT_S);
+    if train_s < SHORTEST_S || moment.is_some() {
+        quality
+            .insert(0, if train_s < SHORTEST_S { too_short(train_s) } else { moment.map_or_else(|| too_short(train_s), a_moment) });
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     progress("smoothing");
@@ -370,8 +374,13 @@ fn analyse_with(
     let train: Vec<Pair> = parallel::map(train, pair);
     let held: Vec<Pair> = parallel::map(held, pair);
     let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
-    if seen_s < 0.5 * SHORTEST_S || train.iter().chain(&held).any(|pair| pair.real.rows.len() < LEAST_ROWS) {
-        quality.insert(0, too_few(seen_s));
+    let empty = train.iter().chain(&held).map(|pair| &pair.real).find(|real| real.rows.len() < LEAST_ROWS);
+    if seen_s < 0.5 * SHORTEST_S || empty.is_some() {
+        if let Some((run, rows)) = train.iter().chain(&held).find_map(|pair| Some((&pair.real.run, pair.real.run.rows_apart()?))) {
+            quality.insert(0, seldom_read(run, rows));
+            return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
+        }
+        quality.insert(0, too_few(seen_s, empty.filter(|_| seen_s >= 0.5 * SHORTEST_S).map(|real| real.run.id.as_str())));
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     fits(&train, train_s, robot.joint_count(), options.free_bytes)?;
@@ -390,6 +399,10 @@ fn analyse_with(
     };
     let mut problem = prior.put_on(problem);
     if problem.cells.is_empty() {
+        if train[0].real.torque.is_none() {
+            let lacks = "no tip of the simulation was seen when one of the recording was".to_owned();
+            return Err(AnalysisError::OneSided { lacks });
+        }
         // A torque is there, of joints that stand; the other channels are compared at rest too.
         return Err(AnalysisError::Standing { run: given[0].id.clone() });
     }
@@ -556,12 +569,39 @@ fn too_short(seconds: f64) -> DataQuality {
     .value(seconds, "s")
 }
 
-fn too_few(seconds: f64) -> DataQuality {
+/// A run that says nothing by itself.
+fn a_moment(run: &Run) -> DataQuality {
+    let seconds = run.len() as f64 * run.dt_s;
     let message = format!(
-        "{seconds:.1} s without empty cells and lost rows are left to fit on; record at least {:.0} s without gaps, better two runs of 30 s",
-        SHORTEST_S / (1.0 - HELD_OUT)
+        "{} has {seconds:.1} s that can be compared, a run needs {MOMENT_S:.0} s at least; leave it out, or record a longer one",
+        run.id
     );
-    DataQuality::new("gaps", Level::Fail, message).value(seconds, "s")
+    DataQuality::new("too_short", Level::Fail, message).run(run.id.clone()).value(seconds, "s")
+}
+
+/// Places that were read so seldom that what the log has between them is bridged over no more.
+fn seldom_read(run: &Run, rows: usize) -> DataQuality {
+    let ms = 1e3 * rows as f64 * run.dt_s;
+    let message = format!(
+        "positions of {} are new only every {rows} rows ({ms:.0} ms), the rows between repeat them; give every {rows}th row, in which they are new,          and no others",
+        run.id
+    );
+    DataQuality::new("gaps", Level::Fail, message).run(run.id.clone()).value(rows as f64, "1")
+}
+
+/// Little that can be used, altogether or in a run.
+fn too_few(seconds: f64, empty: Option<&str>) -> DataQuality {
+    let message = match empty {
+        Some(run) => format!(
+            "next to nothing of {run} is without empty cells and lost rows around it; record it without gaps, or leave it out"
+        ),
+        None => format!(
+            "{seconds:.1} s without empty cells and lost rows are left to fit on; record at least {:.0} s without gaps, better two runs of 30 s",
+            SHORTEST_S / (1.0 - HELD_OUT)
+        ),
+    };
+    let told = DataQuality::new("gaps", Level::Fail, message).value(seconds, "s");
+    if let Some(run) = empty { told.run(run) } else { told }
 }
 
 /// What to know where the effects leave far more of what was held out than of what was fitted, in the channel where that is most.

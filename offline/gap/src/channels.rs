@@ -56,8 +56,10 @@ impl Signal {
 pub(crate) fn in_common(runs: &mut [Both], given: &[bool]) -> Result<Vec<DataQuality>, String> {
     let mut told = Vec::new();
     let mut lacks = Vec::new();
+    let mut nowhere = Vec::new();
     for signal in Signal::ALL {
         if !runs.iter().any(|(real, _)| signal.of(real)) {
+            nowhere.push(format!("{}: {}", signal.columns(), signal.lost()));
             continue;
         }
         let reals = runs.iter().map(|(real, _)| real);
@@ -78,6 +80,9 @@ pub(crate) fn in_common(runs: &mut [Both], given: &[bool]) -> Result<Vec<DataQua
         for run in runs.iter_mut().flat_map(|(real, sim)| std::iter::once(real).chain(sim)) {
             signal.leave_out(run);
         }
+    }
+    if !nowhere.is_empty() {
+        told.push(DataQuality::new("channel", Level::Warn, format!("no recording has {}", nowhere.join("; nor "))));
     }
     let left = |run: &Run| Signal::ALL.into_iter().any(|signal| signal.of(run));
     if !lacks.is_empty() && !runs.iter().any(|(real, _)| left(real)) { Err(lacks.join("; ")) } else { Ok(told) }

@@ -28,8 +28,8 @@ pub(crate) fn elsewhere(robot: &Robot, real: &Run, sim: &Run) -> Option<DataQual
     let (real, sim) = common(real, sim).ok()?;
     let n = robot.joint_count();
     let times = |j: usize| {
-        let (distance, spread) = apart(&real, &sim, j);
-        distance / spread.max(1e-9)
+        let (distance, spread) = apart(robot, &real, &sim, j);
+        distance / spread
     };
     let far: Vec<(usize, f64)> = (0..n).map(|j| (j, times(j))).filter(|(_, times)| *times > ELSEWHERE).collect();
     let driven =
@@ -64,11 +64,14 @@ pub(crate) fn check(robot: &Robot, runs: &[Both]) -> Vec<DataQuality> {
         let position =
             Compared { what: named("position"), than: "that of the simulation", most: POSITION_SCALE, alike: POSITION_ALIKE };
         let of: Vec<_> = both.iter().map(|(real, sim)| (&real.position[j][..], &sim.position[j][..])).collect();
-        all.extend(position.fails(&of, &both[0].0.id));
+        // Where a joint stands, the rest of it goes like anything.
+        if of.iter().all(|(real, _)| robot.moves(j, real)) {
+            all.extend(position.fails(&of, &both[0].0.id));
+        }
         let of: Option<Vec<_>> =
             both.iter().map(|(real, sim)| Some((&real.torque.as_ref()?[j][..], &sim.torque.as_ref()?[j][..]))).collect();
         // Of other motions the torques are others.
-        if let Some(of) = of.filter(|_| both.iter().all(|(real, sim)| alike(real, sim))) {
+        if let Some(of) = of.filter(|_| both.iter().all(|(real, sim)| alike(robot, real, sim))) {
             let torque = Compared { what: named("torque"), most: TORQUE_SCALE, alike: TORQUE_ALIKE, ..position };
             all.extend(torque.fails(&of, &both[0].0.id));
         }
@@ -84,7 +87,8 @@ fn measured(robot: &Robot, runs: &[Both], j: usize) -> Option<DataQuality> {
     let what = format!("measured position of {}", robot.joints[j]);
     let compared = Compared { what, than: "that which is reported", most: POSITION_SCALE, alike: POSITION_ALIKE };
     let points = sources().any(|run| run.points);
-    of.filter(|_| !points).and_then(|of| compared.fails(&of, &runs[0].0.id))
+    let moves = runs.iter().all(|(real, _)| robot.moves(j, &real.position[j]));
+    of.filter(|_| !points && moves).and_then(|of| compared.fails(&of, &runs[0].0.id))
 }
 
 /// A tip as it is measured on both sides.
@@ -157,6 +161,9 @@ impl Compared {
     }
 }
 
+/// Size of a series over its largest value, up to which it is one number but for rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Correlation of two series, and the size of the first over that of the second; none of one that stands.
 fn correlation_and_scale(real: &[f64], sim: &[f64]) -> Option<(f64, f64)> {
     let centred = |s: &[f64]| {
@@ -166,5 +173,6 @@ fn correlation_and_scale(real: &[f64], sim: &[f64]) -> Option<(f64, f64)> {
     let (a, b) = (centred(real), centred(sim));
     let (size_a, size_b) = (rms(a.iter().copied()), rms(b.iter().copied()));
     let product = a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>() / a.len().max(1) as f64;
-    (size_a > 0.0 && size_b > 0.0).then(|| (product / (size_a * size_b), size_a / size_b))
+    let varies = |size: f64, series: &[f64]| size > ROUNDING * series.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    (varies(size_a, real) && varies(size_b, sim)).then(|| (product / (size_a * size_b), size_a / size_b))
 }

@@ -155,7 +155,12 @@ fn gaps(run: &Run) -> Vec<DataQuality> {
         let message = format!("more than half of the cells of {name} are empty: this channel is not looked at");
         DataQuality::new("gaps", Level::Warn, message).run(run.id.clone())
     });
-    masked.into_iter().chain(left_out).collect()
+    let lacks = run.lacks.iter().map(|name| {
+        let message =
+            format!("{name} is missing, though other joints have it: this channel is not looked at; record it of every joint");
+        DataQuality::new("channel", Level::Warn, message).run(run.id.clone())
+    });
+    masked.into_iter().chain(left_out).chain(lacks).collect()
 }
 
 /// What was taken as no reading. Of a simulation only that it is slower than its rows: without noise, numbers repeat where they are rounded.
@@ -261,8 +266,7 @@ pub(crate) fn beyond(robot: &Robot, recording: &Recording, run: &str) -> Option<
 fn another_robot(robot: &Robot, real: &Run, sim: &Run) -> Vec<DataQuality> {
     (0..robot.joint_count())
         .filter_map(|j| {
-            let (apart, spread) = apart(real, sim, j);
-            let usual = spread.max(1e-9);
+            let (apart, usual) = apart(robot, real, sim, j);
             (apart > 2.0 * usual).then(|| {
                 let message = format!(
                     "the simulated {} is {:.1} times its own travel away from the recorded one: another robot, other commands, or a free run",

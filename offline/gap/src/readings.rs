@@ -53,6 +53,13 @@ pub struct NoReadings {
     pub count: usize,
 }
 
+impl NoReadings {
+    /// Rows from one reading to the next of a slow source.
+    pub fn period(&self) -> Option<usize> {
+        if let Why::Slow(period) = self.why { Some(period) } else { None }
+    }
+}
+
 /// What a column is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -60,6 +67,8 @@ pub(crate) enum Kind {
     Place,
     /// Something that may jump, and stay the same.
     Force,
+    /// What was asked for: no reading at all.
+    Command,
 }
 
 /// A tip without what some trackers write where they lost it, and in how many rows they did.
@@ -77,6 +86,9 @@ pub(crate) fn without_zeros(tip: &mut [Vec<f64>]) -> Option<NoReadings> {
 /// Takes out of series that were read together (of one column, or of the three axes of the tip; NaN where there is none), rows about `dt_s` apart,
 /// what is no reading, and says what.
 pub(crate) fn without_false(set: &mut [Vec<f64>], dt_s: f64, of: &str, kind: Kind) -> Vec<NoReadings> {
+    if kind == Kind::Command {
+        return Vec::new();
+    }
     let mut all = Vec::new();
     // Before places are compared, since a wrong one makes two of the one that it stands in; and after, when what was repeated is one reading.
     let mut apart = away_of(set, dt_s, kind);
@@ -91,6 +103,13 @@ pub(crate) fn without_false(set: &mut [Vec<f64>], dt_s: f64, of: &str, kind: Kin
     }
     all.extend(erased(set, apart, of, Why::Away));
     all
+}
+
+/// Takes out of a force or a command what only repeats it, where it was written as seldom as the places beside it, a new one every `period` rows. By
+/// itself it may stay the same; beside places that are taken as they were read, one that is held comes late.
+pub(crate) fn without_repeats(set: &mut [Vec<f64>], dt_s: f64, of: &str, period: usize) -> Option<NoReadings> {
+    let (own, rows) = Levels::of(set).slow(dt_s)?;
+    if own == period { erased(set, rows, of, Why::Slow(period)) } else { None }
 }
 
 /// Rows in which some series of a set leaves its motion and comes back.
@@ -244,7 +263,11 @@ impl Levels {
             next_to || level.count >= period
         };
         let moving = (0..self.all.len()).filter(|k| self.all[*k].count < 4 * period);
-        let again = moving.flat_map(|k| self.all[k].first + usize::from(is_new(k))..self.all[k].first + self.all[k].count);
+        // One that lasts for two periods was read twice: slow motions take longer than that from count to count.
+        let again = moving.flat_map(|k| {
+            let Level { first, count } = self.all[k];
+            (0..count).filter(move |since| !is_new(k) || since % period != 0).map(move |since| first + since)
+        });
         Some((period, again.map(|k| self.rows[k]).collect()))
     }
 

@@ -89,7 +89,12 @@ impl Robot {
     /// Does a joint with these positions move?
     pub(crate) fn moves(&self, j: usize, position: &[f64]) -> bool {
         let (low, high) = crate::series::range(position.iter().copied());
-        high - low > if self.prismatic[j] { STANDING_M } else { STANDING }
+        high - low > self.least_travel(j)
+    }
+
+    /// Travel of a joint up to which it stands, rad or m.
+    pub(crate) fn least_travel(&self, j: usize) -> f64 {
+        if self.prismatic[j] { STANDING_M } else { STANDING }
     }
 
     /// A robot from its URDF.

@@ -56,6 +56,8 @@ pub struct Run {
     pub mask: Vec<bool>,
     /// Columns left out because most of their cells are empty.
     pub left_out: Vec<String>,
+    /// Columns that only some joints have, so that none is used: the first one that is not there, of each quantity.
+    pub lacks: Vec<String>,
     /// Torques that stand at a limit.
     pub saturated: Vec<Saturated>,
 }
@@ -66,6 +68,8 @@ pub type Both = (Run, Option<Run>);
 /// How long a run is: what a report says of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
+    /// First time as it is told, s.
+    pub start_s: f64,
     /// Number of samples.
     pub samples: usize,
     /// Sample period, s.
@@ -73,6 +77,11 @@ pub struct Extent {
 }
 
 impl Extent {
+    /// Time of a sample as it is told, s.
+    pub fn time_s(&self, i: usize) -> f64 {
+        self.start_s + i as f64 * self.dt_s
+    }
+
     /// Length, s.
     pub fn seconds(&self) -> f64 {
         self.samples as f64 * self.dt_s
@@ -82,7 +91,12 @@ impl Extent {
 impl Run {
     /// How long it is.
     pub fn extent(&self) -> Extent {
-        Extent { samples: self.len(), dt_s: self.dt_s }
+        Extent { start_s: self.told_s(self.start_s), samples: self.len(), dt_s: self.dt_s }
+    }
+
+    /// A time of this run as a report has it: on the recording's clock, or from the run's first row on where that clock begins below 0.
+    pub fn told_s(&self, time_s: f64) -> f64 {
+        time_s - (self.start_s - self.since_s).min(0.0)
     }
 
     /// Number of samples.
@@ -93,6 +107,11 @@ impl Run {
     /// Has it no samples?
     pub fn is_empty(&self) -> bool {
         self.position.is_empty() || self.position[0].is_empty()
+    }
+
+    /// Rows from one position to the next, where they are too far apart for what is between them to be believed.
+    pub(crate) fn rows_apart(&self) -> Option<usize> {
+        self.no_readings.iter().find_map(NoReadings::period).filter(|period| *period as f64 * self.dt_s > HOLE_S)
     }
 
     /// Time of a sample, s.
@@ -126,12 +145,16 @@ impl Run {
             recording.column(source).map(|column| column.iter().map(|x| x * scale).collect::<Vec<f64>>())
         };
         let column = |name: &str| mapped(name).or_else(|| recording.column(name).map(<[f64]>::to_vec));
-        let no_readings = RefCell::new(Vec::new());
+        let no_readings: RefCell<Vec<NoReadings>> = RefCell::new(Vec::new());
+        let slow_places = || no_readings.borrow().iter().find_map(NoReadings::period);
         // A column without a single value is not there. A sensor's is without what is no reading of it.
         let series = |kind: Option<Kind>, name: &str| {
             let mut set = [column(name).filter(|column| column.iter().any(|x| x.is_finite()))?];
             if let (Some(kind), false) = (kind, clock.points) {
-                no_readings.borrow_mut().extend(readings::without_false(&mut set, clock.dt_s, name, kind));
+                let as_seldom = slow_places().filter(|_| kind != Kind::Place);
+                let repeats = as_seldom.and_then(|period| readings::without_repeats(&mut set, clock.dt_s, name, period));
+                let others = readings::without_false(&mut set, clock.dt_s, name, kind);
+                no_readings.borrow_mut().extend(repeats.into_iter().chain(others));
             }
             Some(clock.resample(&time, &set[0]))
         };
@@ -139,6 +162,11 @@ impl Run {
         // The first of the names that every joint has.
         let all = |kind: Option<Kind>, names: &[&dyn Fn(usize) -> String]| {
             names.iter().find_map(|name| (0..n).map(|j| series(kind, &name(j))).collect::<Option<Vec<_>>>())
+        };
+        // Where only some joints have it, the first column that is missing.
+        let lacking = |name: &dyn Fn(usize) -> String| {
+            let missing: Vec<usize> = (0..n).filter(|&j| series(None, &name(j)).is_none()).collect();
+            missing.first().filter(|_| missing.len() < n).map(|&j| name(j))
         };
         let (place, force) = (Some(Kind::Place), Some(Kind::Force));
         let motor = all(place, &[&|j| format!("mpos_{}_rad", j + 1)]);
@@ -167,7 +195,9 @@ impl Run {
                 joints
             }
             None => reported().ok_or_else(|| {
-                let joint = (0..n).find(|&j| series(None, &format!("mpos_{}_rad", j + 1)).is_none()).unwrap_or(0);
+                let lacks = |name: String| series(None, &name).is_none();
+                let lacks_both = |j: &usize| lacks(format!("mpos_{}_rad", j + 1)) && lacks(format!("jpos_{}_{}", j + 1, unit(*j)));
+                let joint = (0..n).find(lacks_both).unwrap_or(0);
                 RunError::NoPosition { run: run.clone(), joint: joint + 1, unit: unit(joint), robot: robot.name.clone(), joints: n }
             })?,
         };
@@ -226,6 +256,12 @@ impl Run {
         if let (Some(tip), Some(wrist)) = (&mut tip, with_wrist.then(|| wrist("truth_jpos").or_else(|| wrist("jpos"))).flatten()) {
             straighten(robot, tip, truth.as_ref().unwrap_or(&position), &wrist);
         }
+        let of_torque = torque.is_none().then(|| {
+            let effort = |j: usize| if robot.prismatic[j] { "n" } else { "nm" };
+            lacking(&|j| format!("tau_{}_nm", j + 1)).or_else(|| lacking(&|j| format!("jtau_{}_{}", j + 1, effort(j))))
+        });
+        let of_truth = truth.is_none().then(|| lacking(&|j| format!("truth_jpos_{}_{}", j + 1, unit(j))));
+        let lacks = [of_torque, of_truth].into_iter().flatten().flatten().collect();
         let mut made = Self {
             id: run,
             start_s: clock.start_s,
@@ -238,11 +274,12 @@ impl Run {
             position,
             torque,
             truth,
-            command: all(None, &[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
+            command: all(Some(Kind::Command), &[&|j| format!("jpos_d_{}_{}", j + 1, unit(j))]),
             motor,
             tip,
             no_readings: no_readings.into_inner(),
             left_out: Vec::new(),
+            lacks,
             saturated: limited.0,
         };
         made.alive(robot)?;
@@ -372,6 +409,7 @@ impl Run {
             no_readings: self.no_readings.clone(),
             mask: places.iter().map(|(k, share)| self.mask[*k] || (*share > 0.0 && self.mask[(k + 1).min(last)])).collect(),
             left_out: self.left_out.clone(),
+            lacks: self.lacks.clone(),
             saturated: self.saturated.clone(),
         }
     }
@@ -397,6 +435,7 @@ impl Run {
             no_readings: self.no_readings.clone(),
             mask: self.mask[from..to].to_vec(),
             left_out: self.left_out.clone(),
+            lacks: self.lacks.clone(),
             saturated: self.saturated.clone(),
         }
     }
@@ -458,19 +497,23 @@ fn same_kinds(run: &str, recording: &Recording, robot: &Robot) -> Result<(), Run
 const APART: f64 = 0.25;
 
 /// Is one the same motion as the other at the same time, so that their torques may be compared sample by sample?
-pub fn alike(real: &Run, sim: &Run) -> bool {
+pub fn alike(robot: &Robot, real: &Run, sim: &Run) -> bool {
     let Ok((real, sim)) = common(real, sim) else { return false };
     (0..real.position.len()).all(|j| {
-        let (distance, spread) = apart(&real, &sim, j);
-        distance <= APART * spread.max(1e-4)
+        let (distance, spread) = apart(robot, &real, &sim, j);
+        distance <= APART * spread
     })
 }
 
-/// Distance of a joint's two motions, sample by sample, and the recording's own spread, RMS, rad or m.
-pub fn apart(real: &Run, sim: &Run, joint: usize) -> (f64, f64) {
+/// Distance of a joint's two motions, sample by sample, and the recording's own spread, RMS, rad or m. A joint that stands in both may hang
+/// anywhere within what counts as standing.
+pub fn apart(robot: &Robot, real: &Run, sim: &Run, joint: usize) -> (f64, f64) {
     let (a, b) = (&real.position[joint], &sim.position[joint]);
     let middle = mean(a);
-    (rms(a.iter().zip(b).map(|(a, b)| a - b)), rms(a.iter().map(|x| x - middle)))
+    let least = robot.least_travel(joint);
+    let stands = !robot.moves(joint, a) && !robot.moves(joint, b);
+    let spread = if stands { least / APART } else { rms(a.iter().map(|x| x - middle)).max(least) };
+    (rms(a.iter().zip(b).map(|(a, b)| a - b)), spread)
 }
 
 /// Share of the recording's own jitter from which on a simulation's torque is not that of a simulation.
@@ -498,9 +541,14 @@ fn torque(run: &Run, joint: usize) -> &[f64] {
     run.torque.as_ref().map_or(&[], |torque| &torque[joint])
 }
 
-/// How much a series jitters: the median of its third differences.
+/// Third difference over the largest one, up to which a series is a line there: where it was bridged.
+const STRAIGHT: f64 = 1e-9;
+
+/// How much a series jitters: the median of its third differences, but for where it is a line.
 fn jitter(series: &[f64]) -> f64 {
     let mut steps: Vec<f64> = series.windows(4).map(|x| (x[3] - 3.0 * x[2] + 3.0 * x[1] - x[0]).abs()).collect();
+    let straight = STRAIGHT * steps.iter().copied().fold(0.0, f64::max);
+    steps.retain(|step| *step > straight);
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
@@ -589,6 +637,7 @@ impl Run {
             no_readings: Vec::new(),
             mask: vec![false; series.len()],
             left_out: Vec::new(),
+            lacks: Vec::new(),
             saturated: Vec::new(),
         }
     }

@@ -4,6 +4,8 @@ mod at_once;
 mod by_run;
 mod explained;
 mod likeliest;
+mod otherwise;
+mod settle;
 
 use explained::explained;
 pub(crate) use likeliest::{complexity, likelihood, score_scale};
@@ -85,6 +87,9 @@ const ROUNDED: f64 = 0.2;
 
 /// Claims that are judged before no further effect is said to be there: so many of the first, and of those that gain most.
 const JUDGED: usize = 5;
+
+/// The first claims that may be the first effect, where others are looked for.
+const FIRSTS: usize = 8;
 
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
@@ -219,6 +224,15 @@ fn window_noise(problem: &Problem) -> Vec<Noise> {
     problem.cells.iter().map(|cell| of(cell.channel == Channel::EndEffector, cell.rows.len())).collect()
 }
 
+/// What a forward search did not take.
+#[derive(Default)]
+struct Beyond {
+    /// The best beside all that it took.
+    next: Option<Scored>,
+    /// What else could have been the first.
+    firsts: Vec<Scored>,
+}
+
 /// A search under way.
 struct Search<'p, 'd> {
     problem: &'p Problem<'p>,
@@ -240,32 +254,12 @@ pub fn search<'p>(
     let mut search =
         Search { problem, dictionary, scorer: Scorer::new(problem, window_noise(problem)), candidates, thresholds: *thresholds };
     let none = search.scorer.fit(&search.scorer.empty());
-    let mut chosen: Vec<Candidate> = Vec::new();
-    let mut next = None;
-    while chosen.len() < thresholds.effects {
-        let base = search.grams(&chosen, None);
-        let ranked = search.rank(&chosen);
-        ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
-        let mut accepted = None;
-        for scored in to_judge(&ranked) {
-            let judged = search.judged(&base, &chosen, scored);
-            trace(format!("  judged: {} {judged:.2?}", describe(scored)));
-            if search.accepts(scored, &judged) {
-                // One that removes little stands only where none removes more.
-                if judged.share >= thresholds.share {
-                    accepted = Some(scored.clone());
-                    break;
-                }
-                accepted = accepted.or_else(|| Some(scored.clone()));
-            }
-            next = next.or_else(|| Some(scored.clone()));
-        }
-        let Some(best) = accepted else { break };
-        next = None;
-        chosen.push(best.candidate);
-        search.polish(&mut chosen);
+    let mut chosen = Vec::new();
+    let Beyond { mut next, firsts } = search.forward(&mut chosen, trace);
+    let mut effects = search.settle(&mut chosen, trace);
+    if let Some((others, of_others, beyond)) = search.otherwise(&chosen, firsts, trace) {
+        (chosen, effects, next) = (others, of_others, beyond);
     }
-    let effects = search.settle(&mut chosen, trace);
     let grams = search.grams(&chosen, None);
     let fit = search.scorer.fit(&grams);
     search.scorer.temper(&grams, &fit);
@@ -275,6 +269,38 @@ pub fn search<'p>(
 impl Search<'_, '_> {
     fn grams(&self, chosen: &[Candidate], without: Option<usize>) -> Grams {
         self.scorer.grams(chosen.iter().enumerate().filter(|(k, _)| Some(*k) != without).map(|(_, candidate)| candidate))
+    }
+
+    /// Takes one more effect as long as one is acceptable beside those chosen.
+    fn forward(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Beyond {
+        let mut beyond = Beyond::default();
+        while chosen.len() < self.thresholds.effects {
+            let base = self.grams(chosen, None);
+            let ranked = self.rank(chosen);
+            ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
+            let mut accepted = None;
+            for scored in to_judge(&ranked) {
+                let judged = self.judged(&base, chosen, scored);
+                trace(format!("  judged: {} {judged:.2?}", describe(scored)));
+                if self.accepts(scored, &judged) {
+                    // One that removes little stands only where none removes more.
+                    if judged.share >= self.thresholds.share {
+                        accepted = Some(scored.clone());
+                        break;
+                    }
+                    accepted = accepted.or_else(|| Some(scored.clone()));
+                }
+                beyond.next.get_or_insert_with(|| scored.clone());
+            }
+            let Some(best) = accepted else { break };
+            if chosen.is_empty() {
+                beyond.firsts.extend(ranked.iter().take(FIRSTS).filter(|s| s.score > self.thresholds.nats).cloned());
+            }
+            beyond.next = None;
+            chosen.push(best.candidate);
+            self.polish(chosen);
+        }
+        beyond
     }
 
     fn judged(&mut self, base: &Grams, others: &[Candidate], scored: &Scored) -> Judged {
@@ -357,19 +383,27 @@ impl Search<'_, '_> {
 
     /// Autoregression of what a set leaves, per cell.
     fn noise_left(&self, others: &[Candidate], candidate: &Candidate, fit: &Fit) -> Vec<Noise> {
-        let all = || others.iter().chain([candidate]);
+        let all: Vec<&Candidate> = others.iter().chain([candidate]).collect();
+        let left = self.residuals(&all, fit);
+        let of_cell = |(c, left): (usize, Vec<f64>)| {
+            let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
+            Noise::fit(&parts)
+        };
+        left.into_iter().enumerate().map(of_cell).collect()
+    }
+
+    /// What a set leaves of each cell.
+    fn residuals(&self, all: &[&Candidate], fit: &Fit) -> Vec<Vec<f64>> {
         (0..self.problem.cells.len())
             .map(|c| {
                 let mut left = self.problem.cells[c].residual.clone();
                 let mut start = 0;
-                for own in all() {
+                for own in all {
                     let theta = &fit.coefficients[start..start + own.columns.len()];
                     start += theta.len();
                     own.take_off(c, theta, &mut left);
                 }
-                let left = self.problem.nuisances[c].without(&left);
-                let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
-                Noise::fit(&parts)
+                self.problem.nuisances[c].without(&left)
             })
             .collect()
     }
@@ -404,68 +438,6 @@ impl Search<'_, '_> {
             return self.refined_at_once(base, candidate);
         }
         refined(self.dictionary, candidate, &|candidate| self.scorer.fitted(base, candidate))
-    }
-
-    /// Each effect against everything else in its place, beside the others; what does not hold is dropped.
-    fn settle(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Vec<Effect> {
-        let mut effects = Vec::new();
-        let mut of_a_ripple: Vec<Candidate> = Vec::new();
-        let mut sweep = 0;
-        'again: loop {
-            sweep += 1;
-            effects.clear();
-            // The last ones first: they explain what the first ones may explain as well, once refined alone.
-            for k in (0..chosen.len()).rev() {
-                let mut others: Vec<Candidate> =
-                    chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
-                if let [only] = others.as_mut_slice() {
-                    *only = self.refined(&self.scorer.empty(), only);
-                } else {
-                    self.polish(&mut others);
-                }
-                let base = self.grams(&others, None);
-                let mut ranked = self.rank(&others);
-                // Claims that stand beside are not also rivals.
-                ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
-                let Some(first) = ranked.first() else { continue };
-                let judged = self.judged(&base, &others, first);
-                // What a ripple only seems to leave does not come in its place either.
-                let shaken = of_a_ripple.iter().any(|other| other.same_claim(&first.candidate));
-                let mut accepted = (!shaken && self.accepts(first, &judged)).then(|| (first.clone(), judged));
-                // What was accepted may stand behind what is not acceptable.
-                let own = || ranked.iter().skip(1).find(|r| r.candidate.same_claim(&chosen[k]));
-                if accepted.is_none()
-                    && let Some(own) = own()
-                {
-                    let judged = self.judged(&base, &others, own);
-                    // Beside what is not acceptable it may score little, or less than nothing: what it gains is judged.
-                    let score = own.score.max(judged.gain.nats - price(&own.candidate));
-                    accepted = self.accepts(own, &judged).then(|| (Scored { score, ..own.clone() }, judged));
-                }
-                let Some((best, judged)) = accepted else {
-                    trace(format!("  dropped {} {judged:.2?}", describe(first)));
-                    if judged.of_the_model && !others.is_empty() && first.candidate.same_claim(&chosen[k]) {
-                        of_a_ripple.push(chosen[k].clone());
-                    }
-                    *chosen = others;
-                    continue 'again;
-                };
-                let swapped = !best.candidate.same_claim(&chosen[k]);
-                if swapped && sweep < 4 {
-                    trace(format!("  swapped for {}", describe(&best)));
-                    chosen[k] = best.candidate;
-                    self.polish(chosen);
-                    continue 'again;
-                }
-                chosen[k] = best.candidate.clone();
-                // What stands before it is not acceptable, and no rival.
-                let place = ranked.iter().position(|r| r.candidate.same_claim(&best.candidate)).unwrap_or(0);
-                let rivals = ranked.into_iter().skip(place + 1).collect();
-                effects.push(Effect { chosen: best, rivals, gain: judged.gain, share: judged.share, second: place > 0 });
-            }
-            effects.reverse();
-            return effects;
-        }
     }
 
     /// The best form of every claim beside the others, best claim first. Claims are ordered by how much of the error they

@@ -22,7 +22,7 @@ const MOSTLY: f64 = 2.5;
 /// Share of their own size that they have to leave as well.
 const SHARE: f64 = 0.1;
 /// What a cable does under its load: the library's forms are near ones, and what they leave of a large one says nothing.
-const NEAR_FORMS: [&str; 3] = ["backlash", "cable_stretch", "cable_hysteresis"];
+pub(crate) const NEAR_FORMS: [&str; 3] = ["backlash", "cable_stretch", "cable_hysteresis"];
 /// Squared error of a block, of the largest block's, from which it belongs to the place.
 const BELONGS: f64 = 0.25;
 

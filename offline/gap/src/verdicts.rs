@@ -21,7 +21,7 @@ use crate::pictures;
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
 use crate::search::{Effect, Scored, complexity, is_uneven, likelihood};
-use crate::split::held_out_of;
+use crate::split::{cut, held_out_of};
 use crate::told::{cell_name, cell_quantity, cell_unit, joints, main_cell, told};
 use crate::unexplained::{Pattern, Unexplained};
 use crate::{experiment, regime, region};
@@ -132,13 +132,21 @@ pub(crate) fn outcome(
 }
 
 /// Everything but the answer.
-fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, data_quality: Vec<DataQuality>) -> Report {
+fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, mut data_quality: Vec<DataQuality>) -> Report {
+    // What is said of a simulation stands at its run.
+    for told in &mut data_quality {
+        let of_sim = |one: &&Given| one.sim.as_ref().is_some_and(|(sim, _)| told.run.as_ref() == Some(&sim.name));
+        if let Some(one) = given.iter().find(of_sim) {
+            told.run = Some(one.id.clone());
+        }
+    }
     let out = held_out_of(runs.len());
     let told_runs = runs.iter().zip(given).enumerate().map(|(k, (extent, one))| {
         let (seconds, rate) = (extent.seconds(), 1.0 / extent.dt_s);
         let mut run = if runs.len() == 1 {
-            let start = seconds * 2.0 / 3.0 + 1.0;
-            ToldRun::split(&one.id, (start.min(seconds), seconds), seconds, rate, one.real_sha256.clone())
+            let (_, from) = cut(*extent);
+            let held_out = (extent.time_s(from), extent.time_s(extent.samples));
+            ToldRun::split(&one.id, held_out, seconds, rate, one.real_sha256.clone())
         } else {
             let role = if k + out >= runs.len() { RunRole::HeldOut } else { RunRole::Train };
             ToldRun::new(&one.id, role, seconds, rate, one.real_sha256.clone())
@@ -331,6 +339,12 @@ fn physics(candidate: &Candidate) -> Physics {
     candidate.family.physics.parse().expect("families have names of the vocabulary")
 }
 
+/// Unit of a coupling by a joint that slides, for which the vocabulary has none.
+fn unit_of_coupling(robot: &Robot, candidate: &Candidate, name: &str) -> Option<&'static str> {
+    let &[moved, mover] = candidate.family.joints.as_slice() else { return None };
+    (name == "c_ij" && robot.prismatic[mover]).then(|| if robot.prismatic[moved] { "m/m" } else { "rad/m" })
+}
+
 fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) -> Vec<Parameter> {
     let sliding = candidate.family.joints.first().is_some_and(|j| found.robot.prismatic.get(*j).copied().unwrap_or(false));
     let motion = if sliding { Motion::Prismatic } else { Motion::Revolute };
@@ -342,6 +356,9 @@ fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) ->
             let of = Parameter::of(&physics(candidate), named.name, motion, named.value, *interval);
             let mut parameter = of.unwrap_or_else(|| Parameter::new(named.name, named.value, named.unit, *interval));
             named.unit.clone_into(&mut parameter.unit);
+            if let Some(unit) = unit_of_coupling(found.robot, candidate, named.name) {
+                parameter.extra.set(gap_report::TRUE_UNIT, unit);
+            }
             parameter.method(gap_report::CiMethod::Sandwich)
         })
         .collect()
@@ -400,8 +417,8 @@ const BETWEEN_S: f64 = 1.5;
 
 /// A window in a run, on the run's own clock, with the intervals of its edges where they are known.
 fn interval(run: &Run, window: Window, known: Option<&[Option<Edge>; 2]>) -> Interval {
-    let (first, last) = (run.start_s.max(0.0), run.time_s(run.len() - 1).max(0.0));
-    let start_s = run.start_s - run.since_s;
+    let (first, last) = (run.told_s(run.start_s), run.told_s(run.time_s(run.len() - 1)));
+    let start_s = run.told_s(run.start_s - run.since_s);
     let at = |edge: usize, open: f64| if window[edge].is_finite() { (start_s + window[edge]).clamp(first, last) } else { open };
     let mut told = Interval::new(&run.id, at(0, first), at(1, last));
     let ci = |edge: usize| known.and_then(|edges| edges[edge]).map(|(_, ci)| ci.map(|t| (start_s + t).max(0.0)));
@@ -415,15 +432,20 @@ fn held_ids(found: &Found) -> Vec<String> {
 }
 
 fn fits(found: &Found, k: usize) -> Vec<FitFigure> {
-    let cell = main_cell(found.floors, &found.answer.effects[k].chosen.candidate, &found.estimates[k].coefficients);
+    let (candidate, theta) = (&found.answer.effects[k].chosen.candidate, &found.estimates[k].coefficients);
+    let main = main_cell(found.floors, candidate, theta);
+    // A joint that stands in what was held out has no torque there: then where the effect is highest of what there is.
+    let height = |c: usize| candidate.rms(c, theta) / found.floors[c].max(1e-300);
+    let there = |c: usize| found.before_and_after(c).map(|at| (c, at));
+    let others = || (0..found.floors.len()).filter_map(there).max_by(|(a, _), (b, _)| height(*a).total_cmp(&height(*b)));
+    let Some((cell, (c, before, after))) = there(main).or_else(others) else { return Vec::new() };
     let of = &found.problem.cells[cell];
-    let Some((c, before, after)) = found.before_and_after(cell) else { return Vec::new() };
     let there = &found.held.cells[c];
     let pair = (there.rms(&before), there.rms(&after));
     let floor = Some((found.floors[cell], found.floor_methods[cell]));
     let (quantity, unit) = (cell_quantity(found.robot, of), cell_unit(found.robot, of));
     let mut fit = FitFigure::rms(quantity, unit, Space::EquationError, pair, floor, held_ids(found));
-    if found.is_absent(k) {
+    if found.is_absent(k) || height(cell) == 0.0 {
         fit.removed_fraction = None;
         fit.extra.set(gap_report::ABSENT, true);
     }
@@ -507,7 +529,8 @@ fn seen(found: &Found, number: u64, unexplained: &Unexplained) -> Verdict {
         .iter()
         .map(|&(run, [from, to])| {
             let run = &found.problem.pairs[run].real.run;
-            Interval::new(&run.id, (run.start_s + from).max(0.0), (run.start_s + to).max(0.0))
+            let told = |at: f64| run.told_s(run.start_s + at);
+            Interval::new(&run.id, told(from), told(to))
         })
         .collect();
     let (rms, floor) = (unexplained.rms, unexplained.floor);

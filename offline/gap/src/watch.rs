@@ -2,25 +2,33 @@
 
 use recordings::{Column, Recording};
 
+use crate::clock::Clock;
+use crate::run_error::RunError;
+
 /// Length of what is looked at, s: long enough for every joint to move, short enough for a change to fill it in a minute.
 pub const WINDOW_S: f64 = 60.0;
 /// Time from one look to the next, s.
 pub const STEP_S: f64 = 15.0;
 
 /// Ends of the windows of a run, s on its own clock: one after the other, the last at its end. One window, shorter, of a run
-/// that is no longer than one; none without a time.
-pub fn ends(run: &Recording) -> Vec<f64> {
-    let Some(&[first, .., last]) = run.time_s() else { return Vec::new() };
+/// that is no longer than one.
+///
+/// # Errors
+/// [`RunError`] where it has no time, or one that is no clock.
+pub fn ends(run: &Recording) -> Result<Vec<f64>, RunError> {
+    let time = run.time_s().ok_or_else(|| RunError::NoTime { run: run.name.clone() })?;
+    Clock::of(&run.name, time)?;
+    let (first, last) = (time[0], time[time.len() - 1]);
     let count = ((last - first - WINDOW_S) / STEP_S).floor();
-    if !(count.is_finite() && count >= 0.0) {
-        return vec![last];
+    if count < 0.0 {
+        return Ok(vec![last]);
     }
     let mut ends: Vec<f64> = (0..=count as usize).map(|k| first + WINDOW_S + k as f64 * STEP_S).collect();
     // What is left at the end is worth a look of its own where it is more than a moment.
     if ends.last().is_none_or(|end| last - end > 1.0) {
         ends.push(last);
     }
-    ends
+    Ok(ends)
 }
 
 /// The rows of the window that ends at a time.
@@ -51,7 +59,7 @@ mod tests {
     #[test]
     fn every_window_is_a_minute_and_the_last_ends_with_the_run() {
         let run = run(100);
-        let ends = ends(&run);
+        let ends = ends(&run).expect("a clock");
         assert_eq!(ends.len(), 4);
         for (end, wanted) in ends.iter().zip([65.0, 80.0, 95.0, 104.9]) {
             assert!((end - wanted).abs() < 1e-9, "{ends:?}");
@@ -63,8 +71,18 @@ mod tests {
 
     #[test]
     fn a_short_run_is_one_window() {
+        let ends = |run: &Recording| super::ends(run).expect("a clock");
         assert_eq!(ends(&run(20)).len(), 1);
         assert_eq!(newest(&run(20), ends(&run(20))[0]).rows(), 200);
-        assert!(ends(&Recording::default()).is_empty());
+    }
+
+    #[test]
+    fn what_is_no_clock_has_no_windows() {
+        let refused = |run: &Recording| ends(run).expect_err("refused").to_string();
+        assert!(refused(&Recording::default()).contains("no column t_s"));
+        // A first row of before the clock was set: a hundred million windows.
+        let mut jump = run(100);
+        jump.columns[0].values[0] = -1.7e9;
+        assert!(refused(&jump).contains("time jumps"), "{}", refused(&jump));
     }
 }

@@ -214,6 +214,7 @@ fn full(seed: u64) -> Vec<Order> {
     set.nulls(1.0, 22, 4);
     set.standing(44);
     set.faulty(44, &[3.0, 10.0]);
+    set.pairs(60, &[10.0, 30.0]);
     set.orders
 }
 
@@ -237,5 +238,6 @@ fn dev(seed: u64) -> Vec<Order> {
     set.by_run(&[10.0], 2);
     set.standing(12);
     set.faulty(12, &[3.0]);
+    set.pairs(20, &[30.0]);
     set.orders
 }

@@ -70,6 +70,8 @@ pub struct Pairs {
     pub cases: usize,
     /// Both names given, in distinct verdicts.
     pub both: Rate,
+    /// Both, and no other.
+    pub alone: Rate,
     /// Both within distinct sets.
     pub both_in_set: Rate,
     /// At least one name given.
@@ -86,6 +88,7 @@ impl Pairs {
             level,
             cases: cases.len(),
             both: rate(&|case| case.named == 2),
+            alone: rate(&|case| case.named == 2 && case.alone),
             both_in_set: rate(&|case| case.named_in_set == 2),
             one: rate(&|case| case.named >= 1),
             detected: rate(&|case| case.detected),

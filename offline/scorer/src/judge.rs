@@ -52,7 +52,7 @@ pub struct Judged {
     pub detected: bool,
     /// First name right.
     pub top: bool,
-    /// First name right and no other named.
+    /// First name right and no further one named than there are effects.
     pub alone: bool,
     /// Truth within the first set.
     pub in_set: bool,

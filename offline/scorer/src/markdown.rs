@@ -104,12 +104,21 @@ pub fn tables(score: &Score) -> Vec<Table> {
     tables.push(Table {
         title: "Pairs".into(),
         note: String::new(),
-        head: words(&["severity", "cases", "both named", "both in sets", "at least one named", "mismatch seen"]),
+        head: words(&[
+            "severity",
+            "cases",
+            "both named",
+            "and no other named",
+            "both in sets",
+            "at least one named",
+            "mismatch seen",
+        ]),
         rows: score
             .pairs
             .iter()
             .map(|p| {
-                vec![p.level.to_string(), p.cases.to_string(), rate(&p.both), rate(&p.both_in_set), rate(&p.one), rate(&p.detected)]
+                let rates = [&p.both, &p.alone, &p.both_in_set, &p.one, &p.detected].map(rate);
+                [p.level.to_string(), p.cases.to_string()].into_iter().chain(rates).collect()
             })
             .collect(),
     });
@@ -199,7 +208,7 @@ pub fn text(score: &Score) -> String {
     let mut out = opening(score) + "\n";
     for table in tables(score) {
         let _ = write!(out, "\n{}\n", table.title);
-        if table.head.len() <= 6 {
+        if table.head.len() <= 7 {
             let width = |k: usize| table.rows.iter().chain([&table.head]).map(|row| row[k].chars().count()).max().unwrap_or(0);
             for row in std::iter::once(&table.head).chain(&table.rows) {
                 let cells: Vec<_> = row.iter().enumerate().map(|(k, cell)| format!("{cell:<0$}", width(k))).collect();

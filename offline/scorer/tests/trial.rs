@@ -127,11 +127,13 @@ fn nulls_pairs_and_outside() {
         );
     }
     let payload = json!({"physics": "payload", "parameters": {"m_p": 0.1}, "severity_wanted": 1.0, "severity": 1.1});
-    for id in ["both", "same", "second"] {
+    for id in ["both", "more", "same", "second"] {
         folder.seal(id, &truth(id, "pairs", &json!([coulomb(2.0, 1.0), payload])));
     }
     let named = |rank, physics| verdict(rank, physics, &["shoulder"], 0.5, &json!([]), &["payload"]);
     folder.answer("both", &report("explained", &[named(1, "payload"), named(2, "coulomb_friction")]));
+    let three = ["payload", "coulomb_friction", "backlash"];
+    folder.answer("more", &report("explained", &[1, 2, 3].map(|rank| named(rank, three[rank - 1]))));
     // two sets that hold one effect only: not both
     folder.answer("same", &report("explained", &[named(1, "payload"), named(2, "payload")]));
     folder.answer(
@@ -157,8 +159,10 @@ fn nulls_pairs_and_outside() {
     // 1 of 4, one-sided: p with 4 p^... solved by hand: (1-p)^4 + 4 p (1-p)^3 = 0.05 at 0.7514
     assert!((score.nulls[0].upper95 - 0.7514).abs() < 1e-4, "{}", score.nulls[0].upper95);
     let pairs = &score.pairs[0];
-    assert_eq!((pairs.level, pairs.cases, pairs.both.hits, pairs.one.hits), (1.0, 3, 1, 3));
-    assert_eq!(pairs.both_in_set.hits, 1);
+    assert_eq!((pairs.level, pairs.cases, pairs.both.hits, pairs.one.hits), (1.0, 4, 2, 4));
+    assert_eq!(pairs.both_in_set.hits, 2);
+    // One of the two that have both names has another beside them.
+    assert_eq!(pairs.alone.hits, 1);
     let outside = &score.outside[0];
     assert_eq!([outside.refused.hits, outside.wrong_name.hits, outside.missed.hits, outside.wrong_set.hits], [1, 1, 1, 0]);
     assert_eq!(score.confusion.counts[23][23], 1);

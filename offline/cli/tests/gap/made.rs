@@ -684,3 +684,16 @@ fn what_explains_much_is_not_taken_back_for_a_number_of_its_own() {
     let play = |name: &gap_report::Physics| name.to_string() == "backlash";
     assert!(play(&all[1].physics) || all[1].confusable_with.iter().any(|other| play(&other.physics)), "{all:?}");
 }
+
+#[test]
+fn a_step_beside_a_slow_drift_is_no_cable_that_creeps() {
+    // Creep explains most of it by itself, and what is beside creep then explains little.
+    let folder = Folder::new("step-and-drift");
+    let strong = |physics: &str| Wanted { physics: physics.to_owned(), severity: Some(30.0), ..Wanted::default() };
+    let effects = vec![strong("joint_offset"), strong("thermal_drift")];
+    let order = Order { seed: 50_033, label: "sp33".to_owned(), block: "pairs".to_owned(), effects, ..Order::default() };
+    let report = written(&folder, &order).0.judged(&folder.file("out"));
+    let names: Vec<String> = primary(&report).iter().map(|verdict| verdict.physics.name().into_owned()).collect();
+    assert_eq!(names, ["joint_offset", "thermal_drift"], "{}", report.summary);
+    assert!(primary(&report).iter().all(|verdict| verdict.location.joint == ["shoulder"]), "{}", report.summary);
+}

@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod altered;
+mod as_logged;
 mod by_run;
 mod common;
 mod document;

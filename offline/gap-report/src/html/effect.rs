@@ -93,8 +93,8 @@ fn parameters(physics: &Physics, parameters: &[Parameter]) -> String {
     let again = parameters.iter().any(|parameter| parameter.output_error_value.is_some());
     let sure = parameters.iter().all(|parameter| determined(parameter) == "yes");
     let row = |parameter: &Parameter| {
-        let estimate = Estimate::new(parameter.value, parameter.ci95, &parameter.unit);
-        let by_loop = parameter.output_error_value.map_or_else(String::new, |value| with_unit(value, &parameter.unit));
+        let estimate = Estimate::new(parameter.value, parameter.ci95, parameter.true_unit());
+        let by_loop = parameter.output_error_value.map_or_else(String::new, |value| with_unit(value, parameter.true_unit()));
         let name = parameter_name(physics, &parameter.name);
         let mut row = vec![name, estimate.plain(), estimate.interval()];
         row.extend(again.then_some(by_loop));

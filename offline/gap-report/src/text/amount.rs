@@ -29,12 +29,12 @@ pub(super) fn size(parameter: &Parameter) -> Parameter {
 
 /// `12.1 N (11.3 to 12.9)`, in the multiple that reads best.
 pub(super) fn amount(parameter: &Parameter) -> String {
-    hedged(parameter, &Estimate::new(parameter.value, parameter.ci95, &parameter.unit))
+    hedged(parameter, &Estimate::new(parameter.value, parameter.ci95, parameter.true_unit()))
 }
 
 /// The same, in as many decimals as its distance from what would be nothing needs.
 pub(super) fn amount_beside(parameter: &Parameter, nothing: f64) -> String {
-    hedged(parameter, &Estimate::beside(parameter.value, parameter.ci95, nothing, &parameter.unit))
+    hedged(parameter, &Estimate::beside(parameter.value, parameter.ci95, nothing, parameter.true_unit()))
 }
 
 /// The same in a given multiple.

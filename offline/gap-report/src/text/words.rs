@@ -63,7 +63,8 @@ fn improvement(fit: &Fit) -> String {
     let floor = floor.map_or_else(String::new, |floor| format!(", noise alone {floor}"));
     let gone =
         fit.removed_fraction.map_or_else(String::new, |share| format!(": {} of the removable error gone", percent(share.min(1.0))));
-    let space = if fit.space == Space::ClosedLoop { " in the loop" } else { "" };
+    // What is driven by what was recorded says so itself, and is in no loop.
+    let space = if fit.space == Space::ClosedLoop && !fit.quantity.contains("driven by") { " in the loop" } else { "" };
     if fit.extra.get(ABSENT).is_some() {
         return format!("{} off by {before} {metric}{floor}: nothing of it is there", fit.quantity);
     }

@@ -62,6 +62,9 @@ names! {
     }
 }
 
+/// Key of the unit that a value has, where the vocabulary has none for it.
+pub const TRUE_UNIT: &str = "x_unit";
+
 impl Parameter {
     /// A parameter in a unit. The interval is put in order and widened to hold the value: a bootstrap need not.
     pub fn new(name: impl Into<String>, value: f64, unit: impl Into<String>, ci95: [f64; 2]) -> Self {
@@ -85,6 +88,11 @@ impl Parameter {
     pub fn of(physics: &Physics, name: &str, motion: Motion, value: f64, ci95: [f64; 2]) -> Option<Self> {
         let spec = vocabulary().of(physics)?.parameter(name)?;
         Some(Self { prior_range: Some(spec.raven_range), ..Self::new(name, value, spec.unit_for(motion), ci95) })
+    }
+
+    /// The unit that the value has. The vocabulary has one for each way in which a joint moves; that of a coupling is the moving joint's as well.
+    pub fn true_unit(&self) -> &str {
+        self.extra.get(TRUE_UNIT).and_then(|unit| unit.as_str()).unwrap_or(&self.unit)
     }
 
     /// Sets how the interval was found.
