@@ -583,7 +583,8 @@ fn a_moment(run: &Run) -> DataQuality {
 fn seldom_read(run: &Run, rows: usize) -> DataQuality {
     let ms = 1e3 * rows as f64 * run.dt_s;
     let message = format!(
-        "positions of {} are new only every {rows} rows ({ms:.0} ms), the rows between repeat them; give every {rows}th row, in which they are new,          and no others",
+        "positions of {} are new only every {rows} rows ({ms:.0} ms), the rows between repeat them; give every {rows}th row alone, in which they \
+         are new",
         run.id
     );
     DataQuality::new("gaps", Level::Fail, message).run(run.id.clone()).value(rows as f64, "1")

@@ -119,7 +119,7 @@ fn rows_that_are_repeated_make_nothing_late() {
     let case = Case { real: all(&folder, "real", &case.real, &repeated(10)), ..case };
     let report = case.judged(&folder.file("seldom"));
     assert_eq!(report.status, Status::InsufficientData);
-    assert!(told(&report, "gaps")[0].contains("give every 10th row"), "{:?}", report.data_quality);
+    assert!(told(&report, "gaps")[0].contains("give every 10th row alone"), "{:?}", report.data_quality);
 }
 
 #[test]
