@@ -2,10 +2,10 @@
 
 use crate::output;
 use crate::progress::Progress;
-use crate::read::{told, told_of};
+use crate::read::{self, told, told_of};
 use arm::Side;
 use recordings::cut::{CutSource, CutTable, Stretch};
-use recordings::open::{Opened, open};
+use recordings::open::{Kind, Opened, kind, open};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
 use recordings::stream::{Record, Source, Truth};
@@ -36,6 +36,9 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>, stretch: Stretch)
         (Opened::States(_), Some(_), _) if arm.is_some() => {
             Err(format!("{}: states keep the arms that they have; leave --arm out, or name a table as the output", out.display()))
         }
+        (Opened::Table(_), _, Some(_)) if arm.is_some() => {
+            Err(format!("{}: a table keeps its columns as they are; leave --arm out, or name states as the output", out.display()))
+        }
         (Opened::States(source), Some(format), _) => states_to_states(input, cut(source, stretch), out, format),
         (Opened::States(_), None, Some(format)) => {
             note_all(format.losses_of_states());
@@ -44,7 +47,7 @@ pub(crate) fn run(input: &Path, out: &Path, arm: Option<&str>, stretch: Stretch)
             table_to_table(input, table, out, format)
         }
         (Opened::Table(source), _, Some(format)) => table_to_table(input, cut_table(input, source, stretch)?, out, format),
-        (Opened::Table(_), Some(format), None) => table_to_states(input, out, format, arms.unwrap_or(Arms::Gold), stretch),
+        (Opened::Table(_), Some(format), None) => table_to_states(input, out, format, arms, stretch),
         (_, None, None) => Err(format!("{}: no format has this ending; name the output {OUTPUTS}", out.display())),
     }
 }
@@ -114,7 +117,11 @@ fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, fo
     progress.end();
     let rows = rows.map_err(|error| error.to_string())?;
     if rows == 0 {
-        return Err(format!("{}: it holds no row, or none of that time; nothing was written", input.display()));
+        let why = source.damage().map_or_else(
+            || "it holds no row, or none of that time".to_owned(),
+            |damage| format!("{}: {}", damage.place, damage.what),
+        );
+        return Err(format!("{}: {why}; nothing was written", input.display()));
     }
     sink.finish().map_err(|error| error.to_string())?;
     say!("{}: {rows} rows, {} columns", out.display(), columns.len());
@@ -122,8 +129,21 @@ fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, fo
 }
 
 /// Full states need a time that rises, joints or motors: the strict reader refuses what lacks them.
-fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, stretch: Stretch) -> Result<ExitCode, String> {
-    let recording = strict(input)?;
+fn table_to_states(
+    input: &Path,
+    out: &Path,
+    format: StateFormat,
+    arms: Option<Arms>,
+    stretch: Stretch,
+) -> Result<ExitCode, String> {
+    let (mut recording, status) = strict(input)?;
+    // What the table does not say of its arm is asked for; what it says is so.
+    if let Some(Arms::Gold | Arms::Green) = arms {
+        let name = if arms == Some(Arms::Green) { Side::Green } else { Side::Gold }.name().to_owned();
+        recording.metadata.entry("arm".to_owned()).or_insert(name);
+    }
+    let recorded = recording.metadata.get("arm").and_then(|name| Side::from_name(name)).unwrap_or(Side::Gold);
+    let arms = arms.unwrap_or(if recorded == Side::Green { Arms::Green } else { Arms::Gold });
     let made = states::from_recording(&recording, arms).map_err(|error| error.to_string())?;
     for note in &made.notes {
         say!("note: {note}");
@@ -131,8 +151,13 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, st
     note_all(format.losses());
     let metadata: Vec<(String, String)> = recording.metadata.clone().into_iter().collect();
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
-    let keeps_truth = format != StateFormat::StateFile && format != StateFormat::Columns235;
-    let side = if arms == Arms::Green { Side::Green } else { Side::Gold };
+    let shows_recorded = arms.sides().contains(&recorded);
+    let keeps_truth = format != StateFormat::StateFile && format != StateFormat::Columns235 && shows_recorded;
+    let has_truth = || recording.columns.iter().any(|column| column.name.starts_with("truth_"));
+    if !shows_recorded && has_truth() {
+        say!("note: where the {} arm truly was is left out: it is not shown", recorded.name());
+    }
+    let mut times_ns: Option<(i64, i64)> = None;
     let mut first_ns = None;
     let mut written = 0_usize;
     for (row, state) in made.states.iter().enumerate() {
@@ -142,39 +167,74 @@ fn table_to_states(input: &Path, out: &Path, format: StateFormat, arms: Arms, st
             continue;
         }
         written += 1;
+        times_ns = Some((times_ns.map_or(time_ns, |(first, _)| first), time_ns));
         sink.write(&record).map_err(|error| error.to_string())?;
-        if let Some(truth) = truth(&recording, row, time_ns, side).filter(|_| keeps_truth) {
+        if let Some(truth) = truth(&recording, row, time_ns, recorded).filter(|_| keeps_truth) {
             sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
         }
     }
-    if written == 0 {
+    let Some((first_ns, last_ns)) = times_ns else {
         return Err(format!("{}: it holds no row of that time; nothing was written", input.display()));
-    }
+    };
     sink.finish().map_err(|error| error.to_string())?;
-    say!("{}: {written} states, {:.3} s", out.display(), written as f64 * 1e-3);
-    Ok(ExitCode::SUCCESS)
+    // With the period that the last one lasts.
+    let span_s = (last_ns - first_ns) as f64 * 1e-9;
+    let length_s = span_s * written as f64 / written.saturating_sub(1).max(1) as f64;
+    say!("{}: {written} states, {length_s:.3} s", out.display());
+    Ok(status)
 }
 
-fn strict(input: &Path) -> Result<Recording, String> {
-    let name = input.to_string_lossy();
-    if name.ends_with(".csv") || name.ends_with(".csv.gz") {
-        return csv::read(input).map_err(|error| error.to_string());
+/// A run as a table, and the status to end with. Of text nothing may be amiss; what a file of another kind has lost is told.
+fn strict(input: &Path) -> Result<(Recording, ExitCode), String> {
+    if kind(input).map_err(|error| error.to_string())? == Kind::Csv {
+        return csv::read(input).map(|recording| (recording, ExitCode::SUCCESS)).map_err(|error| error.to_string());
     }
-    match open(input).map_err(|error| error.to_string())? {
-        Opened::Table(mut source) => table::collect(&name, source.as_mut()).map_err(|error| error.to_string()),
-        Opened::States(_) => Err(format!("{name}: is a recording of states")),
+    let Opened::Table(source) = open(input).map_err(|error| error.to_string())? else {
+        return Err(format!("{}: is a recording of states", input.display()));
+    };
+    let (recording, status) = read::all_of(input, source)?;
+    let name = input.display();
+    let time = recording.time_s().unwrap_or_default();
+    if recording.rows() == 0 {
+        return Err(format!("{name}: it holds no row; nothing was written"));
     }
+    if let Some(row) = time.iter().position(|t| !t.is_finite()) {
+        return Err(format!("{name}: row {}: has no time; remove the row", row + 1));
+    }
+    if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let (before, now) = (time[row], time[row + 1]);
+        return Err(format!(
+            "{name}: row {}: time {now} s does not rise above {before} s; sort the rows and drop repeated times",
+            row + 2
+        ));
+    }
+    let is_position = |name: &str| ["mpos_", "jpos_"].iter().any(|start| name.starts_with(start)) && !name.starts_with("jpos_d_");
+    for column in recording.columns.iter().filter(|column| is_position(&column.name)) {
+        if let Some(row) = column.values.iter().position(|x| !x.is_finite()) {
+            return Err(format!(
+                "{name}: row {}, column `{}`: is empty or no number; states have every joint",
+                row + 1,
+                column.name
+            ));
+        }
+    }
+    Ok((recording, status))
 }
 
 /// What the row says of where the arm truly was; none where it says nothing.
 fn truth(recording: &Recording, row: usize, time_ns: i64, side: Side) -> Option<Truth> {
     let cell = |name: &str| recording.column(name).map_or(f64::NAN, |values| values[row]);
-    let mut truth = Truth::unknown(time_ns, side);
+    let offset_s = cell("truth_offset_s");
+    let seen_ns = if offset_s.is_finite() { time_ns + (offset_s * 1e9).round() as i64 } else { time_ns };
+    let mut truth = Truth::unknown(seen_ns, side);
     truth.position_m = ["truth_x_m", "truth_y_m", "truth_z_m"].map(cell);
+    truth.quaternion_wxyz = ["truth_qw", "truth_qx", "truth_qy", "truth_qz"].map(cell);
     for joint in 0..arm::JOINTS {
         let unit = if joint == 2 { "m" } else { "rad" };
         truth.joints[joint] = cell(&format!("truth_jpos_{}_{unit}", joint + 1));
+        truth.cable_force_n[joint] = cell(&format!("truth_cable_{}_n", joint + 1));
     }
-    let known = truth.position_m.iter().chain(&truth.joints).any(|value| value.is_finite());
+    let numbers = truth.position_m.iter().chain(&truth.quaternion_wxyz).chain(&truth.joints).chain(&truth.cable_force_n);
+    let known = numbers.into_iter().any(|value| value.is_finite());
     known.then_some(truth)
 }

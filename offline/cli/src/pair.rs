@@ -4,7 +4,7 @@
 use crate::{output, read, registration};
 use arm::Side;
 use recordings::open::{Opened, open};
-use recordings::pairs::{Clock, ClockChoice, Options, Paired, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
+use recordings::pairs::{Clock, ClockChoice, Options, Pair, Paired, RegistrationChoice, Reported, Truth, pair, stated_offset_s};
 use recordings::save::{self, StateFormat};
 use recordings::stream::{self, Record};
 use recordings::table::TableSource;
@@ -153,26 +153,32 @@ fn recording_with_truth(wish: &Wish, paired: &Paired, side: Side, format: StateF
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
     let mut pairs = paired.pairs.iter().peekable();
     let mut start_ns = None;
+    let truth_of = |pair: &Pair, time_ns: i64| {
+        Record::Truth(stream::Truth {
+            position_m: pair.truth_m,
+            // With a fitted mounting it is the truth but for a constant: not to be learnt from.
+            quaternion_wxyz: pair.truth_wxyz.filter(|_| wish.mounting_known).unwrap_or([f64::NAN; 4]),
+            ..stream::Truth::unknown(time_ns, side)
+        })
+    };
+    let at_ns = |start_ns: i64, pair: &Pair| start_ns + (pair.state_time_s * 1e9).round() as i64;
     while let Some(record) = source.next().map_err(|error| error.to_string())? {
         let time_ns = record.time_ns();
         match &record {
             Record::State(_) => {
                 let start_ns = *start_ns.get_or_insert(time_ns);
-                let at_ns = |time_s: f64| start_ns + (time_s * 1e9).round() as i64;
-                while let Some(pair) = pairs.next_if(|pair| at_ns(pair.state_time_s) < time_ns) {
-                    let truth = stream::Truth {
-                        position_m: pair.truth_m,
-                        // With a fitted mounting it is the truth but for a constant: not to be learnt from.
-                        quaternion_wxyz: pair.truth_wxyz.filter(|_| wish.mounting_known).unwrap_or([f64::NAN; 4]),
-                        ..stream::Truth::unknown(at_ns(pair.state_time_s), side)
-                    };
-                    sink.write(&Record::Truth(truth)).map_err(|error| error.to_string())?;
+                while let Some(pair) = pairs.next_if(|pair| at_ns(start_ns, pair) < time_ns) {
+                    sink.write(&truth_of(pair, at_ns(start_ns, pair))).map_err(|error| error.to_string())?;
                 }
             }
             Record::Truth(truth) if truth.side == side => continue,
             Record::Truth(_) => {}
         }
         sink.write(&record).map_err(|error| error.to_string())?;
+    }
+    // Those of the last state.
+    for pair in pairs {
+        sink.write(&truth_of(pair, at_ns(start_ns.unwrap_or(0), pair))).map_err(|error| error.to_string())?;
     }
     sink.finish().map_err(|error| error.to_string())
 }

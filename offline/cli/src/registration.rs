@@ -81,6 +81,16 @@ pub(crate) fn write(cameras: &Path, found: &RegistrationReport, from: &str) -> R
     output::whole(cameras, |file| file.write_all(whole.as_bytes()).map_err(|error| error.to_string()))
 }
 
+/// The section of a file that is to be written anew, with the comment above it; none where there is no such file, or none in it.
+pub(crate) fn kept(cameras: &Path) -> Option<String> {
+    let text = fs::read_to_string(cameras).ok()?;
+    let section = parsed(cameras, &text).ok()?.remove(NAME)?;
+    let body = toml::to_string(&section).ok()?;
+    Some(format!(
+        "\n# kept from before these cameras were calibrated; it holds where the markers have not been moved since.\n[{NAME}]\n{body}"
+    ))
+}
+
 fn parsed(cameras: &Path, text: &str) -> Result<toml::Table, String> {
     text.parse().map_err(|error: toml::de::Error| {
         let line = error.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);

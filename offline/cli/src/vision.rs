@@ -2,6 +2,7 @@
 
 use crate::output;
 use crate::progress::Progress;
+use crate::registration;
 use ::vision::commands::{self, Calibrated};
 use ::vision::marking::Marking;
 use ::vision::marking::server::Server;
@@ -117,8 +118,16 @@ fn calibrate(rig: &Path, out: &Path, mode: Mode) -> Result<ExitCode, String> {
     let inputs = ["rig.toml", "markers.csv"].map(|name| rig.join(name));
     output::check_file(out, &inputs.each_ref().map(PathBuf::as_path))?;
     let found = commands::calibrate(rig, mode).map_err(|error| error.to_string())?;
-    commands::write_cameras(&found, out).map_err(|error| error.to_string())?;
+    let kept = registration::kept(out);
+    let text = commands::cameras_text(&found) + kept.as_deref().unwrap_or_default();
+    output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
     let _ = output::say(format_args!("{}", calibrated_words(&found)));
+    if kept.is_some() {
+        say!(
+            "note: {}: its [registration] is kept; if the markers were moved since, write it anew: ravenpose pair --register",
+            out.display()
+        );
+    }
     for remark in &found.remarks {
         complain!("ravenpose: {remark}");
     }

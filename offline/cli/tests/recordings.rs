@@ -70,6 +70,61 @@ fn a_simulated_run_has_every_state_and_its_truth_and_converts_to_everything() {
 }
 
 #[test]
+fn a_table_becomes_states_of_its_own_arm_at_its_own_times() {
+    let folder = Folder::new("own-arm");
+    let out = folder.file("runs");
+    assert!(simulate(&out, &["--arm", "green"]).status.success());
+    let (run, table, back) = (out.join("run_0001.mcap"), folder.file("run.csv"), folder.file("back.mcap"));
+    done(&["convert", text(&run), text(&table)]);
+    let said = done(&["convert", text(&table), text(&back)]);
+    assert!(String::from_utf8_lossy(&said.stdout).contains("3000 states, 3.000 s"), "{said:?}");
+    let again = folder.file("again.csv");
+    done(&["convert", text(&back), text(&again)]);
+    let (first, second) = (csv::read(&table).expect("table"), csv::read(&again).expect("table"));
+    for key in ["arm", "start_unix_ns"] {
+        assert_eq!(first.metadata.get(key), second.metadata.get(key), "{key}");
+    }
+    for name in ["x_m", "y_m", "z_m", "truth_x_m", "truth_y_m", "truth_z_m"] {
+        let (a, b) = (first.column(name).expect("before"), second.column(name).expect("after"));
+        let apart = a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 2e-6, "{name}: {apart}");
+        assert_eq!(a.iter().filter(|x| x.is_finite()).count(), b.iter().filter(|x| x.is_finite()).count(), "{name}");
+    }
+    // Shown as the other arm it has no truth: that is in the frame of its own.
+    let other = folder.file("other.mcap");
+    let said = done(&["convert", text(&table), text(&other), "--arm", "gold"]);
+    assert!(String::from_utf8_lossy(&said.stdout).contains("where the green arm truly was is left out"), "{said:?}");
+    let shown = folder.file("other.csv");
+    done(&["convert", text(&other), text(&shown)]);
+    assert!(csv::read(&shown).expect("table").column("truth_x_m").is_none());
+    refused(
+        &ravenpose(&["convert", text(&table), text(&shown), "--arm", "green"]),
+        &["a table keeps its columns", "leave --arm out"],
+    );
+}
+
+#[test]
+fn a_slow_run_is_as_long_as_it_is_and_what_is_no_run_does_not_become_states() {
+    let folder = Folder::new("no-run");
+    // A hundred rows of 10 Hz are ten seconds, whatever the states' own rate.
+    let rows: String = (0..100)
+        .fold("t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad\n".to_owned(), |text, row| text + &format!("{},{row},1,1\n", row as f64 * 0.1));
+    let said = done(&["convert", text(&folder.write("slow.csv", rows)), text(&folder.file("slow.mcap"))]);
+    assert!(String::from_utf8_lossy(&said.stdout).contains("100 states, 10.000 s"), "{said:?}");
+    let header = "t_s,mpos_1_rad,mpos_2_rad,mpos_3_rad,x_mm,y_mm,z_mm";
+    let out = folder.file("out.mcap");
+    for (name, rows, word) in [
+        ("empty.CSV", "", "no row"),
+        ("back.CSV", "0,1,1,1,0,0,0\n0.002,1,1,1,0,0,0\n0.001,1,1,1,0,0,0\n", "does not rise"),
+        ("word.CSV", "0,1,1,1,0,0,0\n0.001,2o.5,1,1,0,0,0\n", "2o.5"),
+    ] {
+        let table = folder.write(name, format!("{header}\n{rows}"));
+        refused(&ravenpose(&["convert", text(&table), text(&out)]), &[name, word]);
+        assert!(!out.exists());
+    }
+}
+
+#[test]
 fn a_stretch_is_cut_out_of_states_and_tables_alike() {
     let folder = Folder::new("cut");
     let out = folder.file("runs");

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use arm::Side;
 use common::Scratch;
-use parquet::basic::{ConvertedType, Repetition, Type as PhysicalType};
+use parquet::basic::{Compression, ConvertedType, GzipLevel, Repetition, Type as PhysicalType};
 use parquet::data_type::{BoolType, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
@@ -267,6 +267,48 @@ fn files_of_other_programs_are_tables_too() {
     assert!(x[0] == 0.0005 && x[1].is_nan());
     assert_eq!(recording.text("word").expect("words"), ["", "a", ""]);
     assert_eq!(source.damage(), None);
+}
+
+/// A column of whole numbers that stand for something, compressed.
+fn of_kind(path: &Path, codec: Compression, kind: ConvertedType) {
+    let mut field =
+        Type::primitive_type_builder("count", PhysicalType::INT32).with_repetition(Repetition::REQUIRED).with_converted_type(kind);
+    if kind == ConvertedType::DECIMAL {
+        field = field.with_precision(9).with_scale(2);
+    }
+    let fields = vec![Arc::new(field.build().expect("field"))];
+    let schema = Type::group_type_builder("schema").with_fields(fields).build().expect("schema");
+    let properties = WriterProperties::builder().set_compression(codec).build();
+    let file = std::fs::File::create(path).expect("file");
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("writer");
+    let mut group = writer.next_row_group().expect("group");
+    let mut column = group.next_column().expect("column").expect("column");
+    column.typed::<Int32Type>().write_batch(&[1, -294_967_296, 7], None, None).expect("values");
+    column.close().expect("close");
+    group.close().expect("group");
+    writer.close().expect("file");
+}
+
+#[test]
+fn what_pandas_writes_by_default_is_read_and_numbers_without_a_sign_have_none() {
+    let scratch = Scratch::new("parquet-codecs");
+    let path = scratch.path().join("foreign.parquet");
+    let codecs = [Compression::SNAPPY, Compression::GZIP(GzipLevel::default()), Compression::LZ4_RAW, Compression::UNCOMPRESSED];
+    for (codec, kind, second) in codecs
+        .into_iter()
+        .flat_map(|codec| [(codec, ConvertedType::INT_32, -294_967_296.0), (codec, ConvertedType::UINT_32, 4_000_000_000.0)])
+    {
+        of_kind(&path, codec, kind);
+        let mut source = TableReader::open(&path).expect("open");
+        let recording = recordings::table::collect("foreign", &mut source).expect("table");
+        assert_eq!(recording.column("count"), Some(&[1.0, second, 7.0][..]), "{codec}");
+        assert_eq!(source.damage(), None, "{codec}");
+    }
+    for (kind, word) in [(ConvertedType::DECIMAL, "decimals"), (ConvertedType::DATE, "dates")] {
+        of_kind(&path, Compression::SNAPPY, kind);
+        let error = TableReader::open(&path).err().expect("refused").to_string();
+        assert!(error.contains("column `count` holds") && error.contains(word), "{error}");
+    }
 }
 
 #[test]

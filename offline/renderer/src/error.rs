@@ -22,7 +22,7 @@ pub enum Error {
         what: String,
     },
     /// The folder holds something already.
-    #[error("{folder}: is not empty; give a new folder")]
+    #[error("{folder}: is not empty, or has no name of its own; give a new folder by its name")]
     Occupied {
         /// Path.
         folder: String,

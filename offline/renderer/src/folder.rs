@@ -39,7 +39,8 @@ pub fn render(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Rendered> {
-    if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) || out.is_file() {
+    // One without a name of its own ("." and "..") cannot be put in place whole.
+    if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) || out.is_file() || out.file_name().is_none() {
         return Err(Error::Occupied { folder: out.display().to_string() });
     }
     let aside = out.with_extension(format!("part{}", std::process::id()));

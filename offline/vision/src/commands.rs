@@ -102,12 +102,17 @@ fn remark(rig: &Rig, calibrated: &mut Calibrated) -> Result<()> {
     Ok(())
 }
 
+/// The text of `cameras.toml`.
+pub fn cameras_text(calibrated: &Calibrated) -> String {
+    cameras_file::text(&calibrated.cameras, &calibrated.method)
+}
+
 /// Writes `cameras.toml`.
 ///
 /// # Errors
 /// If it cannot be written.
 pub fn write_cameras(calibrated: &Calibrated, file: &Path) -> Result<()> {
-    whole(file, &cameras_file::text(&calibrated.cameras, &calibrated.method))
+    whole(file, &cameras_text(calibrated))
 }
 
 /// Measures the recording of a scene folder; `progress` is told frames done and in all.

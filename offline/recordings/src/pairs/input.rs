@@ -34,6 +34,7 @@ const REPORTED: [&str; 3] = ["x_m", "y_m", "z_m"];
 /// Columns of the true tip in a run's own table.
 const TRUTH: [&str; 3] = ["truth_x_m", "truth_y_m", "truth_z_m"];
 const QUATERNION: [&str; 4] = ["qw", "qx", "qy", "qz"];
+const TRUE_QUATERNION: [&str; 4] = ["truth_qw", "truth_qx", "truth_qy", "truth_qz"];
 const NEEDS: &str = "time (t_s) and the tip's position on both sides (x_mm, y_mm, z_mm and truth_x_mm, truth_y_mm, truth_z_mm)";
 
 const NEEDS_TRUTH: &str = "a true position beside the reported one";
@@ -92,10 +93,14 @@ impl Truth {
         let (t_s, axes) = (column(recording, "t_s", NEEDS)?, columns(recording, TRUTH, NEEDS_TRUTH)?);
         let at = |row: usize| axes.map(|axis| axis[row]);
         let rows: Vec<usize> = (0..t_s.len()).filter(|row| at(*row).iter().any(|value| value.is_finite())).collect();
+        // It stands in the row of the state next to it, and was seen so much later.
+        let offset = recording.column("truth_offset_s");
+        let seen_s = |row: usize| t_s[row] + offset.map_or(0.0, |offset| if offset[row].is_finite() { offset[row] } else { 0.0 });
+        let turned: Option<[&[f64]; 4]> = columns(recording, TRUE_QUATERNION, NEEDS).ok();
         Ok(Self {
-            t_s: rows.iter().map(|&row| t_s[row]).collect(),
+            t_s: rows.iter().map(|&row| seen_s(row)).collect(),
             position_m: rows.iter().map(|&row| at(row)).collect(),
-            quaternion: None,
+            quaternion: turned.map(|columns| rows.iter().map(|&row| columns.map(|column| column[row])).collect()),
         })
     }
 

@@ -3,11 +3,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use parquet::basic::Type as PhysicalType;
+use parquet::basic::{Compression, ConvertedType, Type as PhysicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_typed_column_reader};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{FileMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, FileMetaData, RowGroupMetaData};
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::schema::types::ColumnDescriptor;
@@ -34,6 +34,31 @@ pub(super) struct Cells {
     /// 1 where a cell has a value; empty if all have.
     levels: Vec<i16>,
     optional: bool,
+    /// Are its whole numbers without a sign?
+    pub(super) unsigned: bool,
+}
+
+/// What the numbers of a column stand for, where they are not themselves.
+fn stands_for(column: &ColumnDescriptor) -> Option<&'static str> {
+    match column.converted_type() {
+        ConvertedType::DECIMAL => Some("decimals"),
+        ConvertedType::DATE => Some("dates"),
+        ConvertedType::TIME_MILLIS | ConvertedType::TIME_MICROS => Some("times of day"),
+        _ => None,
+    }
+}
+
+/// Codecs that this program has.
+fn is_read(codec: Compression) -> bool {
+    matches!(
+        codec,
+        Compression::UNCOMPRESSED
+            | Compression::SNAPPY
+            | Compression::GZIP(_)
+            | Compression::LZ4
+            | Compression::LZ4_RAW
+            | Compression::ZSTD(_)
+    )
 }
 
 impl Cells {
@@ -50,7 +75,14 @@ impl Cells {
         if column.max_rep_level() > 0 || column.max_def_level() > 1 {
             return Err(format!("column `{}` holds lists or groups", column.path().string().escape_debug()));
         }
-        Ok(Self { values, levels: Vec::new(), optional: column.max_def_level() > 0 })
+        if let Some(what) = stands_for(column) {
+            return Err(format!("column `{}` holds {what}", column.path().string().escape_debug()));
+        }
+        let unsigned = matches!(
+            column.converted_type(),
+            ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64
+        );
+        Ok(Self { values, levels: Vec::new(), optional: column.max_def_level() > 0, unsigned })
     }
 
     /// For each row, does its cell have a value?
@@ -67,7 +99,7 @@ impl Cells {
     /// Replaces the cells by the next ones of the file; an error unless there are as many as rows.
     fn read(&mut self, reader: &mut Typed, rows: usize) -> Result<(), ParquetError> {
         self.levels.clear();
-        let Self { values, levels, optional } = self;
+        let Self { values, levels, optional, .. } = self;
         let levels = optional.then_some(levels);
         match (values, reader) {
             (CellValues::Bool(values), Typed::Bool(reader)) => fill(values, levels, reader, rows),
@@ -146,6 +178,12 @@ impl Groups {
             descriptors.iter().map(|column| Cells::new(column)).collect::<Result<Vec<_>, _>>().map_err(|what| {
                 refusal(path, None, what, "this program reads flat tables of numbers and words; flatten it first")
             })?;
+        let codecs =
+            reader.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns).map(ColumnChunkMetaData::compression);
+        if let Some(codec) = codecs.into_iter().find(|codec| !is_read(*codec)) {
+            let what = format!("is compressed by {codec}, which this program does not read");
+            return Err(refusal(path, None, what, "write it with zstd, snappy, gzip, lz4 or without compression"));
+        }
         let mut groups = Self {
             path: path.to_owned(),
             metadata: pairs(file),

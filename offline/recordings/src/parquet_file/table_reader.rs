@@ -89,8 +89,13 @@ fn put(to: &mut ColumnCells, from: &Cells, rows: usize, column: &TableColumn) ->
             to.resize(rows, f64::NAN);
             match &from.values {
                 CellValues::Bool(values) => scatter(to, from, rows, values.iter().map(|value| f64::from(u8::from(*value)))),
+                CellValues::I32(values) if from.unsigned => {
+                    scatter(to, from, rows, values.iter().map(|value| f64::from(*value as u32)));
+                }
                 CellValues::I32(values) => scatter(to, from, rows, values.iter().map(|value| f64::from(*value))),
-                CellValues::I64(values) if values.iter().any(|value| value.unsigned_abs() > EXACT_MAX) => {
+                CellValues::I64(values)
+                    if values.iter().any(|value| if from.unsigned { *value as u64 } else { value.unsigned_abs() } > EXACT_MAX) =>
+                {
                     return Err(format!(
                         "column `{}` holds whole numbers beyond 2^53, which a table cannot keep exactly",
                         column.name.escape_debug()

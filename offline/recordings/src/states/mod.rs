@@ -93,9 +93,15 @@ pub fn from_recording(recording: &Recording, arms: Arms) -> Result<States, State
     let channels = Channels::new(recording)?;
     let mut notes = notes::assumptions(recording, &channels, recorded.side, arms);
     let samples = samples(&channels, &recorded);
+    // Where the table says when it began, its times count from there; stamps do not go below 0.
+    let began_ns = recording.metadata.get("start_unix_ns").and_then(|text| text.parse::<i64>().ok()).unwrap_or(0);
+    let before_s = channels.time_s.first().map_or(0.0, |first| if began_ns == 0 { first.min(0.0) } else { 0.0 });
+    if before_s < 0.0 {
+        notes.push(format!("Time: it begins at {before_s} s; stamps count from its first row."));
+    }
     let states: Vec<RavenState> = samples
         .iter()
-        .zip(cycles(channels.time_s))
+        .zip(cycles(channels.time_s, began_ns - nanoseconds(before_s)))
         .map(|(sample, cycle)| {
             let mut state = sample::state_of(&cycle);
             for arm in &shown {
@@ -116,14 +122,14 @@ fn recorded_side(recording: &Recording) -> Result<Side, StatesError> {
         .ok_or_else(|| StatesError::UnknownArm { recording: recording.name.clone(), found: found.escape_debug().to_string() })
 }
 
-/// Header times of every row. The first `dt` is one control period, as for text recordings (ravenstate.md, section 2).
-fn cycles(time_s: &[f64]) -> impl Iterator<Item = Cycle> {
+/// Header times of every row; `zero_ns` is when its time was 0. The first `dt` is one control period, as for text recordings (ravenstate.md, section 2).
+fn cycles(time_s: &[f64], zero_ns: i64) -> impl Iterator<Item = Cycle> {
     let period_s = sample::nominal(Side::Gold).encoders.period_s();
     let start = time_s.first().copied().unwrap_or(0.0);
     time_s.iter().enumerate().map(move |(index, now)| Cycle {
         index: index as u64,
         since_start_ns: nanoseconds(now - start),
-        stamp_ns: nanoseconds(*now),
+        stamp_ns: zero_ns.saturating_add(nanoseconds(*now)),
         dt_ns: nanoseconds(if index == 0 { period_s } else { now - time_s[index - 1] }),
     })
 }

@@ -134,10 +134,11 @@ fn against_recorded_tip(recording: &Recording, arm: &Arm, samples: &[ArmSample])
         })
         .collect();
     distance_um.sort_by(f64::total_cmp);
+    let largest = distance_um.last()?;
     Some(format!(
         "Tip: the computed position lies {:.1} um (median), {:.1} um (largest) from the recorded one.",
         distance_um[distance_um.len() / 2],
-        distance_um[distance_um.len() - 1]
+        largest
     ))
 }
 

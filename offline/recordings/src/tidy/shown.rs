@@ -11,6 +11,8 @@ use crate::stream::{Record, Source, StreamError};
 #[derive(Default)]
 pub struct Shown {
     arms: u32,
+    /// Time of the first state, which truth may stand before, ns.
+    pub(super) first_state_ns: Option<i64>,
     truths: [TruthShown; 2],
     align: Align,
 }
@@ -31,10 +33,13 @@ impl Shown {
     /// Also what this record holds, which comes after all the others.
     pub(super) fn include(&mut self, record: Record) {
         self.arms |= match &record {
-            Record::State(state) => match state.connected() {
-                0 => fields::arms_by_content(state),
-                connected => connected,
-            },
+            Record::State(state) => {
+                self.first_state_ns.get_or_insert(record.time_ns());
+                match state.connected() {
+                    0 => fields::arms_by_content(state),
+                    connected => connected,
+                }
+            }
             Record::Truth(truth) => 1 << truth.side.index(),
         };
         if let Some(row) = self.align.push(record) {

@@ -68,7 +68,8 @@ impl StateTable {
         let sides = options.arms.map_or_else(|| shown.arms(), |arms| arms.sides().to_vec());
         let of = |side: &Side| shown.truth(*side, options.all_truth);
         let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, of(side), options.orientation)).collect();
-        let start_ns = peeked.iter().find(|record| matches!(record, Record::State(_))).map(Record::time_ns);
+        let peeked_ns = || peeked.iter().find(|record| matches!(record, Record::State(_))).map(Record::time_ns);
+        let start_ns = shown.first_state_ns.or_else(peeked_ns);
         let mut columns = vec![TableColumn::number("t_s")];
         for arm in &arms {
             let prefix = if arms.len() > 1 { format!("{}_", arm.arm.side.name()) } else { String::new() };
@@ -100,7 +101,7 @@ impl StateTable {
 
     fn put(&mut self, row: &Row, batch: &mut Batch) {
         self.row.clear();
-        self.row.push(row.time_ns.saturating_sub(self.start_ns.unwrap_or(row.time_ns)) as f64 / 1e9);
+        self.row.push(row.time_ns.saturating_sub(*self.start_ns.get_or_insert(row.time_ns)) as f64 / 1e9);
         for arm in &self.arms {
             let truth = row.truths[arm.arm.side.index()].as_ref();
             self.uncovered += u64::from(

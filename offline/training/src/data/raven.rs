@@ -15,6 +15,8 @@ use std::path::Path;
 
 /// A truth further from every state than this belongs to none: half a period of the slowest recordings (100 Hz).
 const APART_MAX_NS: i64 = 5_000_000;
+/// By how much the length of a quaternion may be off 1.
+const OF_LENGTH_ONE: f64 = 0.05;
 /// No arm of half a metre is off by more: units or frames contradict each other then.
 const ERROR_MAX_MM: f64 = 100.0;
 /// The same of the orientation.
@@ -86,6 +88,8 @@ struct Pairing<'a> {
     says_runlevel: bool,
     /// Truths left out because of the run level.
     left_out: usize,
+    /// Truths beside states that no robot can have.
+    impossible: usize,
     /// What is wrong with a row that may yet be left out.
     doubt: Option<TrainingError>,
     found: Trajectory,
@@ -116,6 +120,7 @@ impl<'a> Pairing<'a> {
             next_ns: i64::MIN,
             says_runlevel: false,
             left_out: 0,
+            impossible: 0,
             doubt: None,
             found: Trajectory { name, ..Trajectory::default() },
         }
@@ -169,6 +174,11 @@ impl<'a> Pairing<'a> {
         }
         let board = state.type_[self.side.index()];
         let inputs = self.features;
+        // The service answers no such state. What is no number at all is refused below.
+        if inputs.iter().all(|value| value.is_finite()) && !may_follow_recorded(&self.possible, &inputs) {
+            self.impossible += 1;
+            return Ok(());
+        }
         let Some(label) = self.label(state, truth) else { return Ok(()) };
         let start_ns = *self.start_ns.get_or_insert(truth.time_ns);
         let time_s = (truth.time_ns - start_ns) as f64 * 1e-9;
@@ -230,7 +240,8 @@ impl<'a> Pairing<'a> {
     /// From the reported to the true orientation: rotation vector, degrees, frame 0.
     fn turn(&self, state: &RavenState, truth: &Truth) -> Option<[f64; 3]> {
         let [w, x, y, z] = truth.quaternion_wxyz;
-        let (reported, there) = if truth.quaternion_wxyz.iter().all(|part| part.is_finite()) {
+        // Four zeros are a tracker's that knows no orientation.
+        let (reported, there) = if (Quaternion::new(w, x, y, z).norm() - 1.0).abs() < OF_LENGTH_ONE {
             let row_major = std::array::from_fn(|place| state.ori[9 * self.side.index() + place]);
             let reported = UnitQuaternion::from_rotation_matrix(&published::rotation(&row_major)?);
             // Of a matrix in float32.
@@ -280,6 +291,12 @@ impl<'a> Pairing<'a> {
             notes.push(format!("{file}: {} truths outside run level {PEDAL_DOWN} (pedal down) are left out", self.left_out));
         } else if !self.says_runlevel {
             notes.push(format!("{file}: does not say its run levels: all its truths are used"));
+        }
+        if self.impossible > 0 {
+            notes.push(format!(
+                "{file}: {} truths beside states that no robot can have (input_impossible) are left out",
+                self.impossible
+            ));
         }
         if self.found.rows() == 0 {
             let tip = if self.target == Quantity::Position { "tip" } else { "orientation of the tip" };

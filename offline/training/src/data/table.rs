@@ -56,13 +56,23 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
         let time_s = recording.time_s().map_or(row as f64, |time| time[row]);
         let truth_is_there = truth.iter().all(|column| column[row].is_finite());
         let values: Vec<f64> = inputs.iter().map(|column| column[row]).collect();
-        if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
+        if let Some(bad) = values.iter().position(|value| !(*value as f32).is_finite()) {
             return Err(TrainingError::Unfit {
                 file: shown(file),
-                what: format!("{} is empty or not a number in row {} after the header", columns.inputs[bad], row + 1),
+                what: format!(
+                    "{} is empty, not a number or beyond float32 in row {} after the header",
+                    columns.inputs[bad],
+                    row + 1
+                ),
                 remedy: "fill or remove the row",
             });
         }
+        // A session that begins anew is another one, not a part of the last.
+        if time_s < before_s {
+            next_s = f64::NEG_INFINITY;
+            memories.held.clear();
+        }
+        before_s = time_s;
         let remembered = memories.next(&values);
         if !truth_is_there {
             left_out += 1;
@@ -72,11 +82,6 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
             .map(|output| (truth[output][row] - reported.get(output).map_or(0.0, |column| column[row])) as f32)
             .collect();
         found.sketch.add(values.iter().map(|value| *value as f32).chain(labels.iter().copied()));
-        // A session that begins anew is another one, not a part of the last.
-        if time_s < before_s {
-            next_s = f64::NEG_INFINITY;
-        }
-        before_s = time_s;
         if recording.time_s().is_some() && time_s < next_s {
             continue;
         }

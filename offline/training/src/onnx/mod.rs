@@ -113,7 +113,13 @@ pub fn read(bytes: &[u8]) -> Result<(Chain, BTreeMap<String, String>), String> {
     if !whole || !fits {
         return Err("is not a chain that ravenpose wrote".to_owned());
     }
-    let metadata = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
+    let metadata: BTreeMap<String, String> = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
+    // What was read is what the file computes only if the file is what would have been written: attributes, shapes and wiring too.
+    let again = Model::decode(write(&chain, &metadata).as_slice()).ok().and_then(|model| model.graph);
+    let same = |again: &Graph| again.node == graph.node && again.initializer == graph.initializer;
+    if !again.as_ref().is_some_and(same) {
+        return Err("is not a chain that ravenpose wrote".to_owned());
+    }
     Ok((chain, metadata))
 }
 
@@ -183,6 +189,37 @@ mod tests {
                 other[at] ^= 0x55;
                 let _ = read(&other);
             }
+        }
+    }
+
+    #[test]
+    fn what_computes_something_else_than_the_chain_in_it_is_not_read() {
+        let bytes = write(&chain(), &BTreeMap::new());
+        assert!(read(&bytes).is_ok());
+        let refused = |change: &dyn Fn(&mut Graph)| {
+            let mut model = Model::decode(bytes.as_slice()).expect("a model");
+            change(model.graph.as_mut().expect("a graph"));
+            read(&model.encode_to_vec()).expect_err("refused")
+        };
+        let gemm = |graph: &Graph| graph.node.iter().position(|node| node.op_type == "Gemm").expect("a layer");
+        let all: [&dyn Fn(&mut Graph); 4] = [
+            // Weights the other way round; half of the sum; a matrix of other sides; an activation that nobody waits for.
+            &|graph| {
+                let node = gemm(graph);
+                graph.node[node].attribute.clear();
+            },
+            &|graph| {
+                let node = gemm(graph);
+                graph.node[node].attribute.push(Attribute { name: "alpha".to_owned(), i: 0, kind: 1 });
+            },
+            &|graph| graph.initializer.iter_mut().find(|one| one.dims.len() == 2).expect("weights").dims.reverse(),
+            &|graph| {
+                let (last, first) = (graph.node.len() - 1, graph.node[gemm(graph)].output[0].clone());
+                graph.node[last].input[0] = first;
+            },
+        ];
+        for change in all {
+            assert!(refused(change).contains("is not a chain that ravenpose wrote"));
         }
     }
 }

@@ -37,6 +37,9 @@ pub fn record(
     if out.is_file() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
         return Err(Error::content(out, "folder", "is not empty", "give a new folder"));
     }
+    if out.file_name().is_none() {
+        return Err(Error::content(out, "folder", "has no name of its own to be renamed to", "give a new folder by its name"));
+    }
     if !(0.01..=1000.0).contains(&frames_per_s) || seconds.is_some_and(|s| !(s > 0.0 && s < 1e6)) {
         let what = format!("{frames_per_s} frames/s for {seconds:?} s");
         return Err(Error::content(out, "rate", what, "give 0.01 to 1000 frames/s and a positive length"));
