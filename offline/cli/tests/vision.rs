@@ -69,6 +69,10 @@ fn a_simulated_recording_is_rendered_measured_and_paired() {
     std::fs::write(own.0.join("scene.toml"), "resolution = [640, 480]\nframes_per_s = 10.0\nclock_offset_s = 1.2\ntool = true\n")
         .expect("scene");
     done(&own.0, &["simulate", "--minutes", "0.17", "--seed", "4", "--out", "runs"]);
+    // A folder without a name of its own cannot be put in place whole: told before the work, which would be lost.
+    let here = own.0.join("here");
+    std::fs::create_dir(&here).expect("folder");
+    refused(&here, &["vision", "render", "../runs/run_0001.mcap", "--out", "."], &["has no name of its own"]);
     let render =
         ["vision", "render", "runs/run_0001.mcap", "--out", "seen", "--scene", "scene.toml", "--seed", "3", "--seconds", "8"];
     let words = done(&own.0, &render);
@@ -80,6 +84,14 @@ fn a_simulated_recording_is_rendered_measured_and_paired() {
         refused(&own.0, &["vision", "calibrate", "seen", "--out", out], &[words]);
     }
     done(&own.0, &["vision", "calibrate", "seen", "--out", "cameras.toml"]);
+    // Calibrated again, what belongs to the set-up stays.
+    let registration =
+        "\n[registration]\nrotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\ntranslation_mm = [1.5, 2.5, 3.5]\n";
+    std::fs::write(own.0.join("cameras.toml"), own.text("cameras.toml") + registration).expect("cameras");
+    let words = done(&own.0, &["vision", "calibrate", "seen", "--out", "cameras.toml"]);
+    assert!(words.contains("its [registration] is kept"), "{words}");
+    assert_eq!(own.text("cameras.toml").matches("[registration]").count(), 1);
+    assert!(own.text("cameras.toml").contains("translation_mm = [1.5, 2.5, 3.5]"), "{}", own.text("cameras.toml"));
     for (out, words) in [("none/truth.csv", "there is no folder none"), ("cameras.toml", "both input and output")] {
         refused(&own.0, &["vision", "track", "--cameras", "cameras.toml", "seen", "--out", out], &[words]);
     }

@@ -187,3 +187,27 @@ fn the_connected_arm_is_shown_by_itself() {
     assert_eq!(run.metadata["arm"], "green");
     assert!(run.column("mpos_1_rad").is_some());
 }
+
+#[test]
+fn a_table_begins_with_the_first_state_however_much_truth_stands_before_it() {
+    let scratch = Scratch::new("tidy-truth-first");
+    let states = motion(50, 1_570_000_000);
+    let mut random = Random(12);
+    // More of it than is looked at where a source comes once only.
+    let early = (0..10_000).map(|k| {
+        let mut truth = truth_of(&states[0], Side::Gold, &mut random);
+        truth.time_ns -= 20_000_000_000 - k * 1_000_000;
+        Record::Truth(truth)
+    });
+    let records: Vec<Record> = early.chain(states.iter().map(record)).collect();
+    let path = file(&scratch, &records);
+    let opened = recordings::tidy::open(&path, Options::default()).expect("table");
+    let start = opened.metadata().iter().find(|(key, _)| key == "start_unix_ns").map(|(_, value)| value.clone());
+    assert_eq!(start, Some(stamp_ns(&states[0]).to_string()));
+    for mut table in [opened, Box::new(StateTable::new(source(&path), Options::default()).expect("table"))] {
+        let recording = table::collect("run", table.as_mut()).expect("rows");
+        let time = recording.time_s().expect("time");
+        assert_eq!(time.len(), 50);
+        assert!(time[0] == 0.0 && time.windows(2).all(|pair| pair[1] > pair[0]), "{:?}", &time[..3]);
+    }
+}

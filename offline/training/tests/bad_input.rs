@@ -4,8 +4,12 @@
 mod common;
 
 use common::{Folder, runs, small};
+use ravenpose::correction::Quantity;
+use recordings::open::{Opened, open};
+use recordings::save::{self, StateFormat};
+use recordings::stream::Record;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use training::commands::{self, Wish};
 use training::data::{Columns, Reading};
 
@@ -89,4 +93,79 @@ fn units_that_contradict_the_header_are_refused() {
     let csv = folder.text("kg.csv", &table("t_s,jpos_1_kg,truth_jpos_1_rad", |k| format!("{k},0.1")));
     let found = line(&folder, &[csv], Some(columns(&["jpos_1_kg"], &["truth_jpos_1_rad"])));
     assert!(found.contains("kg.csv") && found.contains("kg"), "{found}");
+}
+
+/// A run with its records changed, by their number.
+fn changed(folder: &Folder, run: &Path, name: &str, change: &dyn Fn(usize, &mut Record)) -> PathBuf {
+    let Ok(Opened::States(mut source)) = open(run) else { panic!("states") };
+    let file = folder.file(name);
+    let mut sink = save::create_states(&file, StateFormat::Mcap, &[]).expect("file");
+    let mut number = 0;
+    while let Some(mut record) = source.next().expect("record") {
+        change(number, &mut record);
+        number += 1;
+        sink.write(&record).expect("written");
+    }
+    sink.finish().expect("file");
+    file
+}
+
+#[test]
+fn states_that_no_robot_can_have_are_no_rows() {
+    let folder = Folder::new("impossible");
+    let run = runs(&folder, 1, 2.0, ".mcap").remove(0);
+    let reading = Reading::default();
+    let whole = training::data::read(std::slice::from_ref(&run), &reading, &mut |_, _| {}).expect("a run");
+    // A motor at a billion degrees for a twentieth of a second: several truths stand beside it.
+    let glitch = changed(&folder, &run, "glitch.mcap", &|number, record| {
+        if let (Record::State(state), true) = (record, (1000..1100).contains(&number)) {
+            state.mpos[0] = 1e9;
+        }
+    });
+    let read = training::data::read(&[glitch], &reading, &mut |_, _| {}).expect("a run");
+    let rows = |set: &training::data::DataSet| set.trajectories[0].rows();
+    assert!(rows(&read) < rows(&whole) && rows(&read) > rows(&whole) / 2, "{} of {}", rows(&read), rows(&whole));
+    assert!(read.trajectories[0].inputs.iter().all(|value| value.abs() < 1e8));
+    assert!(read.notes.iter().any(|note| note.contains("states that no robot can have")), "{:?}", read.notes);
+}
+
+#[test]
+fn a_quaternion_of_zeros_is_no_orientation() {
+    let folder = Folder::new("zeros");
+    let run = runs(&folder, 1, 1.0, ".mcap").remove(0);
+    let zeros = changed(&folder, &run, "zeros.mcap", &|_, record| {
+        if let Record::Truth(truth) = record {
+            truth.quaternion_wxyz = [0.0; 4];
+            truth.joints = [f64::NAN; 7];
+        }
+    });
+    let reading = Reading { target: Quantity::Orientation, ..Reading::default() };
+    assert!(training::data::read(&[run], &reading, &mut |_, _| {}).is_ok());
+    let error = training::data::read(&[zeros], &reading, &mut |_, _| {}).expect_err("no orientation").to_string();
+    assert!(error.contains("no true orientation"), "{error}");
+}
+
+#[test]
+fn numbers_beyond_float32_are_refused_where_they_stand() {
+    let folder = Folder::new("beyond");
+    let table =
+        folder.text("far.csv", &table("t_s,u_mm,y_mm", |k| format!("{},{k}", if k == 7 { 1e39 } else { f64::from(k as u32) })));
+    let found = line(&folder, &[table], Some(columns(&["u_mm"], &["y_mm"])));
+    assert!(found.contains("u_mm is empty, not a number or beyond float32 in row 8"), "{found}");
+}
+
+#[test]
+fn the_plays_of_a_table_begin_anew_with_a_session() {
+    let folder = Folder::new("plays-anew");
+    let session = |from: f64| -> String {
+        (0..40).fold(String::new(), |text, k| text + &format!("{},{},0\n", from + f64::from(k % 9), 0.1 * f64::from(k)))
+    };
+    let reading =
+        Reading { columns: Some(Columns { plays: vec![2.0], ..columns(&["u"], &["y"]) }), truth_hz: 10.0, ..Reading::default() };
+    let inputs = |name: &str, text: String| {
+        let file = folder.text(name, &format!("u,t_s,y\n{text}"));
+        training::data::read(&[file], &reading, &mut |_, _| {}).expect("a table").trajectories[0].inputs.clone()
+    };
+    let (first, second) = (inputs("one.csv", session(0.0)), inputs("two.csv", session(50.0)));
+    assert_eq!(inputs("both.csv", session(0.0) + &session(50.0)), [first, second].concat());
 }
