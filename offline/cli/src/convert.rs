@@ -8,7 +8,7 @@ use recordings::cut::{CutSource, CutTable, Stretch};
 use recordings::open::{Kind, Opened, kind, open};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
-use recordings::stream::{Record, Source, Truth};
+use recordings::stream::{Damage, Record, Source, Truth};
 use recordings::table::{self, TableSource};
 use recordings::tidy;
 use recordings::{Recording, csv};
@@ -74,6 +74,13 @@ fn arms_of(name: &str) -> Arms {
     }
 }
 
+/// Why nothing of an input was written: it is damaged from the begin, or has none of what is asked for.
+fn nothing_of(input: &Path, what: &str, damage: Option<&Damage>) -> String {
+    let why = damage
+        .map_or_else(|| format!("it holds no {what}, or none of that time"), |damage| format!("{}: {}", damage.place, damage.what));
+    format!("{}: {why}; nothing was written", input.display())
+}
+
 fn note_all(losses: &[&str]) {
     for loss in losses {
         say!("note: {loss}");
@@ -89,11 +96,7 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
     progress.end();
     let records = records.map_err(|error| error.to_string())?;
     if records == 0 {
-        let why = source.damage().map_or_else(
-            || "it holds no state, or none of that time".to_owned(),
-            |damage| format!("{}: {}", damage.place, damage.what),
-        );
-        return Err(format!("{}: {why}; nothing was written", input.display()));
+        return Err(nothing_of(input, "state", source.damage()));
     }
     sink.finish().map_err(|error| error.to_string())?;
     for channel in source.channels().iter().filter(|channel| !channel.is_read && channel.messages > 0) {
@@ -117,11 +120,7 @@ fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, fo
     progress.end();
     let rows = rows.map_err(|error| error.to_string())?;
     if rows == 0 {
-        let why = source.damage().map_or_else(
-            || "it holds no row, or none of that time".to_owned(),
-            |damage| format!("{}: {}", damage.place, damage.what),
-        );
-        return Err(format!("{}: {why}; nothing was written", input.display()));
+        return Err(nothing_of(input, "row", source.damage()));
     }
     sink.finish().map_err(|error| error.to_string())?;
     say!("{}: {rows} rows, {} columns", out.display(), columns.len());

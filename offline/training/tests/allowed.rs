@@ -3,10 +3,8 @@
 
 mod common;
 
-use common::{Folder, runs, small};
+use common::{Folder, changed, runs, small};
 use ravenpose::config::ModelSource;
-use recordings::open::{Opened, open};
-use recordings::save::{self, StateFormat};
 use recordings::stream::Record;
 use std::path::{Path, PathBuf};
 use training::commands::{self, Wish};
@@ -14,19 +12,14 @@ use training::data::{self, Reading};
 
 /// The same recording with other run levels: `level` of each state's number.
 fn at_levels(folder: &Folder, file: &Path, level: impl Fn(usize) -> i32) -> PathBuf {
-    let out = folder.file(&format!("levels_{}", file.file_name().expect("name").to_string_lossy()));
-    let Opened::States(mut source) = open(file).expect("recording") else { panic!("states") };
-    let mut sink = save::create_states(&out, StateFormat::Mcap, &[]).expect("file");
+    let name = format!("levels_{}", file.file_name().expect("name").to_string_lossy());
     let mut states = 0;
-    while let Some(mut record) = source.next().expect("record") {
-        if let Record::State(state) = &mut record {
+    changed(folder, file, &name, |record| {
+        if let Record::State(state) = record {
             state.runlevel = level(states);
             states += 1;
         }
-        sink.write(&record).expect("record");
-    }
-    sink.finish().expect("file");
-    out
+    })
 }
 
 #[test]

@@ -3,13 +3,11 @@
 
 mod common;
 
-use common::{Folder, runs, small};
+use common::{Folder, changed, runs, small};
 use ravenpose::correction::Quantity;
-use recordings::open::{Opened, open};
-use recordings::save::{self, StateFormat};
 use recordings::stream::Record;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use training::commands::{self, Wish};
 use training::data::{Columns, Reading};
 
@@ -95,21 +93,6 @@ fn units_that_contradict_the_header_are_refused() {
     assert!(found.contains("kg.csv") && found.contains("kg"), "{found}");
 }
 
-/// A run with its records changed, by their number.
-fn changed(folder: &Folder, run: &Path, name: &str, change: &dyn Fn(usize, &mut Record)) -> PathBuf {
-    let Ok(Opened::States(mut source)) = open(run) else { panic!("states") };
-    let file = folder.file(name);
-    let mut sink = save::create_states(&file, StateFormat::Mcap, &[]).expect("file");
-    let mut number = 0;
-    while let Some(mut record) = source.next().expect("record") {
-        change(number, &mut record);
-        number += 1;
-        sink.write(&record).expect("written");
-    }
-    sink.finish().expect("file");
-    file
-}
-
 #[test]
 fn states_that_no_robot_can_have_are_no_rows() {
     let folder = Folder::new("impossible");
@@ -117,10 +100,12 @@ fn states_that_no_robot_can_have_are_no_rows() {
     let reading = Reading::default();
     let whole = training::data::read(std::slice::from_ref(&run), &reading, &mut |_, _| {}).expect("a run");
     // A motor at a billion degrees for a twentieth of a second: several truths stand beside it.
-    let glitch = changed(&folder, &run, "glitch.mcap", &|number, record| {
+    let mut number = 0;
+    let glitch = changed(&folder, &run, "glitch.mcap", |record| {
         if let (Record::State(state), true) = (record, (1000..1100).contains(&number)) {
             state.mpos[0] = 1e9;
         }
+        number += 1;
     });
     let read = training::data::read(&[glitch], &reading, &mut |_, _| {}).expect("a run");
     let rows = |set: &training::data::DataSet| set.trajectories[0].rows();
@@ -133,7 +118,7 @@ fn states_that_no_robot_can_have_are_no_rows() {
 fn a_quaternion_of_zeros_is_no_orientation() {
     let folder = Folder::new("zeros");
     let run = runs(&folder, 1, 1.0, ".mcap").remove(0);
-    let zeros = changed(&folder, &run, "zeros.mcap", &|_, record| {
+    let zeros = changed(&folder, &run, "zeros.mcap", |record| {
         if let Record::Truth(truth) = record {
             truth.quaternion_wxyz = [0.0; 4];
             truth.joints = [f64::NAN; 7];

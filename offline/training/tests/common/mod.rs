@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use arm::Side;
+use recordings::open::{Opened, open};
 use recordings::save::{self, StateFormat};
+use recordings::stream::Record;
 use simulator::Robot;
 use simulator::production::{Motion, Plan, Player};
 use training::preset::Recipe;
@@ -65,6 +67,19 @@ pub(crate) fn runs_of(robot: Robot, seed: u64, folder: &Folder, count: usize, se
             file
         })
         .collect()
+}
+
+/// A recording with its records changed, in their order.
+pub(crate) fn changed(folder: &Folder, recording: &Path, name: &str, mut change: impl FnMut(&mut Record)) -> PathBuf {
+    let Opened::States(mut source) = open(recording).expect("recording") else { panic!("states") };
+    let file = folder.file(name);
+    let mut sink = save::create_states(&file, StateFormat::Mcap, &[]).expect("file");
+    while let Some(mut record) = source.next().expect("record") {
+        change(&mut record);
+        sink.write(&record).expect("record");
+    }
+    sink.finish().expect("file");
+    file
 }
 
 /// A recipe that takes a second.
