@@ -39,6 +39,14 @@ pub struct Limits {
     pub late_fallback: u32,
 }
 
+impl Limits {
+    /// Age of the state of a message, ns, at which its readers may no longer use it before they have the next one: [`Limits::stale_ns`] less the
+    /// way to them.
+    fn outlived_ns(&self) -> i64 {
+        self.stale_ns - (self.stale_ns - self.period_ns) / 16
+    }
+}
+
 impl Default for Limits {
     fn default() -> Self {
         Self {
@@ -119,6 +127,8 @@ struct Arm<E> {
     valid: bool,
     /// Was the last message of it valid? An answer that falls back before it is sent was not.
     shown_valid: bool,
+    /// Source time of that message, ns.
+    shown_ns: i64,
     ever_valid: bool,
     reset_count: u32,
 }
@@ -155,6 +165,7 @@ impl<E: Estimator> Cycle<E> {
             hold_flags: 0,
             valid: false,
             shown_valid: false,
+            shown_ns: 0,
             ever_valid: false,
             reset_count: 0,
         });
@@ -290,14 +301,15 @@ impl<E: Estimator> Cycle<E> {
         self.new_source = true;
     }
 
-    /// A state that a newer one overtakes is not answered, but where the joints were is remembered.
+    /// A state that a newer one overtakes is not answered, but where the joints and encoders were is remembered.
     fn remember_overtaken(&mut self) {
         for (index, arm) in self.arms.iter_mut().enumerate() {
-            if !arm.position.remembers() && !arm.orientation.remembers() {
-                continue;
-            }
             if self.newest.connected() & (1 << index) == 0 {
                 arm.forget();
+                continue;
+            }
+            arm.watch_encoders(&self.newest, index);
+            if !arm.position.remembers() && !arm.orientation.remembers() {
                 continue;
             }
             features::extract(&self.newest, index, &mut self.features);
@@ -410,10 +422,13 @@ impl<E: Estimator> Cycle<E> {
                     out.flags |= flag::DEGRADED;
                 }
             }
+            // Whoever holds the last message has gone back to the raw pose by himself: what he sees next is a step.
+            let outlived = arm.shown_valid && now_ns.saturating_sub(arm.shown_ns) >= self.limits.outlived_ns();
+            let reasons = if outlived { reasons | flag::INPUT_STALE } else { reasons };
             if reasons != 0 {
                 arm.fall_back(reasons, &self.limits, out);
             }
-            arm.shown_valid = out.status == ArmStatus::Valid as u32;
+            (arm.shown_valid, arm.shown_ns) = (out.status == ArmStatus::Valid as u32, pose.source_time_ns);
         }
         pose.late = self.counters.late;
         pose.overruns = self.counters.overruns;
@@ -451,6 +466,17 @@ impl<E: Estimator> Arm<E> {
         (position.0 | orientation.0, position.1 | orientation.1)
     }
 
+    /// For how many cycles an encoder has stood still although its motor moves.
+    fn watch_encoders(&mut self, state: &RavenState, index: usize) -> u32 {
+        let still = self.frozen.observe(state, index);
+        self.is_frozen = still >= FROZEN_AFTER;
+        if self.is_frozen {
+            // What was followed since the encoders froze did not move either: the way since then is unseen, however short the rest of it.
+            self.forget();
+        }
+        still
+    }
+
     fn judge(
         &mut self,
         state: &RavenState,
@@ -462,13 +488,7 @@ impl<E: Estimator> Arm<E> {
     ) -> Judgement {
         let (reasons, information) = self.standing(allow_untrained);
         let mut judged = Judgement { reasons: common | reasons, information, score: -1.0 };
-        let still = self.frozen.observe(state, index);
-        self.is_frozen = still >= FROZEN_AFTER;
-        if self.is_frozen {
-            // What was followed since the encoders froze did not move either: the way since then is unseen, however short the rest of it.
-            self.forget();
-        }
-        match still {
+        match self.watch_encoders(state, index) {
             FROZEN_AFTER.. => judged.reasons |= flag::INPUT_FROZEN,
             DEGRADED_AFTER.. => judged.information |= flag::DEGRADED,
             _ => {}

@@ -13,6 +13,8 @@ pub const FROZEN_AFTER: u32 = 18;
 
 /// A motor that moved at least this many counts in the last cycle cannot stand in the next.
 const MOVING_COUNTS: i64 = 3;
+/// By so many counts per cycle a motor that brakes gets slower from one cycle to the next.
+const BRAKING_COUNTS: i64 = 2;
 /// A reported speed beyond this is more than one count per millisecond (90 deg/s).
 const MOVING_DEG_S: f32 = 135.0;
 /// Breakaway: 0.05 to 0.1 N m of friction over kp = 0.3 N m/rad is 10 to 19 degrees of motor angle; no motor lags further at rest.
@@ -74,7 +76,10 @@ impl Motor {
     fn observe(&mut self, count: i32, command: f32, speed: f32, cycles: u32) -> u32 {
         let moved = (i64::from(count) - i64::from(self.count)).abs();
         if moved > 0 {
-            *self = Self { count, command, speed: moved / i64::from(cycles), ..Self::default() };
+            // Over states that are missing it is the mean that is seen: at their end a motor that brakes is slower by half of what it loses.
+            let cycles = i64::from(cycles);
+            let speed = moved / cycles - BRAKING_COUNTS * (cycles - 1) / 2;
+            *self = Self { count, command, speed, ..Self::default() };
             return 0;
         }
         if !(-COMMAND_MAX_DEG..=COMMAND_MAX_DEG).contains(&self.command) {
@@ -132,6 +137,24 @@ mod tests {
         }
         for _ in 0..1000 {
             assert_eq!(watch.observe(&state, 0), 0);
+        }
+    }
+
+    #[test]
+    fn a_robot_that_came_to_rest_while_states_were_missing_is_not_frozen() {
+        // 12 counts per cycle, less by one with each: the mean over what is missing is more than a motor that stops dead can have.
+        for missing in 1..14_u64 {
+            let mut watch = FrozenWatch::default();
+            let (mut state, mut speed) = (RavenState::new(), 12);
+            for sequence in 1..500 {
+                state.sequence = sequence;
+                speed = if sequence > 20 { (speed - 1).max(0) } else { speed };
+                state.enc_vals[1] += speed;
+                if (20..20 + missing).contains(&sequence) {
+                    continue;
+                }
+                assert_eq!(watch.observe(&state, 0), 0, "{missing} missing, state {sequence}");
+            }
         }
     }
 

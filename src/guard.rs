@@ -59,6 +59,11 @@ pub const IMPOSSIBLE: [Limit; 31] = [
     limit(117, 1, 0.0, 0.1),                  // dt, s
 ];
 
+/// First of the nine numbers of the reported orientation.
+const ORIENTATION: usize = 6;
+/// By how much products of its rows may be off those of a rotation: logs keep a few digits.
+const OF_ROTATION: f32 = 0.05;
+
 /// The region that a model was trained on, from the model's metadata.
 #[derive(Debug, Clone)]
 pub struct Domain {
@@ -137,12 +142,25 @@ impl Guard {
         if !finite {
             return Verdict { reasons: flag::INPUT_NOT_FINITE, score: -1.0 };
         }
+        possible &= features[ORIENTATION..].first_chunk().is_some_and(is_orientation);
         let mut verdict = Verdict { reasons: if possible { 0 } else { flag::INPUT_IMPOSSIBLE }, score: -1.0 };
         if let Some(domain) = &self.domain {
             domain.check(features, &mut verdict);
         }
         verdict
     }
+}
+
+/// Is it a rotation, right-handed? Nine zeros are a log that does not say.
+fn is_orientation(numbers: &[f32; 9]) -> bool {
+    let [ax, ay, az, bx, by, bz, cx, cy, cz] = *numbers;
+    let lengths = [ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz];
+    if lengths == [0.0; 3] {
+        return true;
+    }
+    let volume = (ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz;
+    // Rows of length one span a volume of one only where they are at right angles.
+    lengths.iter().chain([&volume]).all(|one| (one - 1.0).abs() <= OF_ROTATION)
 }
 
 impl Domain {
@@ -201,6 +219,29 @@ mod tests {
             assert_ne!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
             tried[feature] = value.next_down();
             assert_ne!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
+        }
+    }
+
+    #[test]
+    fn an_orientation_is_a_rotation_or_not_reported() {
+        let (sin, cos) = 0.7_f32.sin_cos();
+        let turned = [cos, -sin, 0.0, 0.6 * sin, 0.6 * cos, -0.8, 0.8 * sin, 0.8 * cos, 0.6];
+        let of = |change: &dyn Fn(&mut [f32])| {
+            let mut tried = features();
+            tried[6..15].copy_from_slice(&turned);
+            change(&mut tried[6..15]);
+            Guard::new(None).check(&tried).reasons
+        };
+        assert_eq!(of(&|_| {}), 0);
+        assert_eq!(of(&|ori| ori.fill(0.0)), 0, "not reported");
+        // Three digits, as some logs have it.
+        assert_eq!(of(&|ori| ori.iter_mut().for_each(|part| *part = (*part * 1000.0).round() / 1000.0)), 0);
+        let half = |ori: &mut [f32]| ori.iter_mut().for_each(|part| *part *= 0.5);
+        let mirrored = |ori: &mut [f32]| ori[..3].iter_mut().for_each(|part| *part = -*part);
+        let doubled = |ori: &mut [f32]| ori.copy_within(0..3, 3);
+        let of_another = |ori: &mut [f32]| ori[..3].copy_from_slice(&[1.0, 0.0, 0.0]);
+        for change in [&half as &dyn Fn(&mut [f32]), &mirrored, &doubled, &of_another] {
+            assert_eq!(of(change), flag::INPUT_IMPOSSIBLE);
         }
     }
 

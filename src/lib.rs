@@ -12,6 +12,7 @@ pub mod check;
 pub mod config;
 pub mod correction;
 pub mod cycle;
+pub mod eye;
 pub mod frozen;
 pub mod guard;
 pub mod histogram;

@@ -94,10 +94,11 @@ pub fn set_fifo(priority: i32) -> Result<(), Missing> {
 /// # Errors
 /// [`Missing`] when it would (measured: 50 ms of every second).
 pub fn throttling() -> Result<(), Missing> {
-    let path = "/proc/sys/kernel/sched_rt_runtime_us";
-    let allowed = std::fs::read_to_string(path).unwrap_or_default();
+    let read = |name: &str| std::fs::read_to_string(format!("/proc/sys/kernel/sched_rt_{name}_us")).unwrap_or_default();
+    let (allowed, period) = (read("runtime"), read("period"));
     let allowed = allowed.trim();
-    if allowed == "-1" {
+    // The whole period is as good as no limit.
+    if allowed == "-1" || (!allowed.is_empty() && allowed == period.trim()) {
         return Ok(());
     }
     Err(Missing {

@@ -188,10 +188,11 @@ impl<E: Estimator> Runner<E> {
     /// # Errors
     /// Any [`TransportError`] of opening; the reader stays what it was.
     pub fn another_reader(&mut self, settings: &Settings) -> Result<(), TransportError> {
+        let reader = Reader::open(settings, QUEUE);
+        // Until here the watchdog is patient.
         self.shared.another_reader.store(false, Relaxed);
-        let reader = Reader::open(settings, QUEUE)?;
         if let Some(link) = &mut self.link {
-            link.reader = reader;
+            link.reader = reader?;
         }
         Ok(())
     }

@@ -11,16 +11,16 @@ use crate::runner::{Ended, Runner, TestHook, Waiting};
 use crate::shared::{self, EventSender, Shared};
 use crate::watch::{self, TICK, Watch};
 use crate::{abort, say, signals};
-use ravenpose_transport::Message;
+use ravenpose_transport::{Message, Settings};
 use ravenpose_wire::{ARMS, CorrectedPose, flag};
 use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest wait for the loop to send its last message: half a second, in ticks of this thread, so that a stop of the whole process
 /// does not count. A loop that runs takes one period; one whose core stands still is waited for.
@@ -28,6 +28,8 @@ const STOP_TICKS: u32 = 500;
 const STOP_TICK: Duration = Duration::from_millis(1);
 /// Longest pause between two tries to open the link anew, each twice as long as the last: each reaches into the controller, too.
 const PAUSE_MAX: Duration = Duration::from_secs(1);
+/// After so long without a link it is asked whether there can be one.
+const SHUT_OUT_AFTER: Duration = Duration::from_secs(3);
 
 const USAGE: &str = "\
 ravenposed - corrects the end-effector pose of a RAVEN-II in hard real time
@@ -294,6 +296,15 @@ fn serve(config: &Config, prepared: Prepared, standing: u32, hook: Option<TestHo
     Ok(ExitCode::SUCCESS)
 }
 
+/// Can no file be made under the transport's root? In a unit's sandbox a directory that was removed and made anew is another one, and read-only:
+/// only a new process gets it.
+fn is_shut_out(settings: &Settings) -> bool {
+    let file = Path::new(&settings.root).join(format!(".ravenposed-{}", std::process::id()));
+    let made = std::fs::create_dir_all(&settings.root).and_then(|()| std::fs::write(&file, ""));
+    let removed = std::fs::remove_file(&file);
+    made.is_err() && removed.is_err()
+}
+
 fn spawn_loop(
     config: &Config,
     cycle: Cycle<Estimate>,
@@ -336,6 +347,7 @@ fn spawn_loop(
                 // Not real time: there is no link.
                 let mut said = String::new();
                 let mut pause = TICK;
+                let begun = Instant::now();
                 while let Err(error) = runner.reopen(&config.transport)
                     && !shared.stop.load(Relaxed)
                 {
@@ -345,6 +357,12 @@ fn spawn_loop(
                         && trouble.try_send(format!("the link cannot be opened anew: {text}; it is tried again")).is_ok()
                     {
                         said = text;
+                    }
+                    if begun.elapsed() > SHUT_OUT_AFTER && is_shut_out(&config.transport) {
+                        return Err(format!(
+                            "the link cannot be opened anew: {said}; {} cannot be written by this process any more: ending, so that it is started anew",
+                            config.transport.root
+                        ));
                     }
                     std::thread::sleep(pause);
                     pause = (2 * pause).min(PAUSE_MAX);

@@ -1,14 +1,15 @@
 //! The ordinary thread beside the loop: watchdog, log, statistics, and an eye on the link.
 
 use crate::config::{ARM_NAMES, Config};
+use crate::eye::{Eye, Sight};
 use crate::histogram::{Collector, Histograms};
 use crate::notify::{WATCHDOG, notify};
 use crate::report::{Log, Stats};
 use crate::shared::{Event, EventReceiver, Shared};
 use crate::writer::Writer;
 use crate::{abort, say};
-use ravenpose_transport::{Message, Probe, Settings};
-use ravenpose_wire::{ARMS, ArmStatus, CorrectedPose, FALLBACK_REASONS, RavenState, flag_names};
+use ravenpose_transport::Message;
+use ravenpose_wire::{ARMS, ArmStatus, FALLBACK_REASONS, RavenState, flag_names};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -61,8 +62,9 @@ pub struct Watch {
     heartbeat: u64,
     still: u32,
     stuck_ticks: u32,
-    settings: Settings,
-    probe: Probe,
+    eye: Eye,
+    /// What the eye said last where it could not see, so that it is said once.
+    blind: Option<String>,
     /// States taken in when the link was last checked.
     accepted: u64,
     /// Messages refused until then.
@@ -115,12 +117,12 @@ impl Watch {
             heartbeat: 0,
             still: 0,
             stuck_ticks: if realtime { STUCK_TICKS } else { STUCK_TICKS_DEGRADED },
-            settings: config.transport.clone(),
             accepted: 0,
             refused: 0,
             receive_failures: 0,
             deaf: false,
-            probe: Probe::open(&config.transport).map_err(|error| error.to_string())?,
+            eye: Eye::open(&config.transport)?,
+            blind: None,
             unreachable: 0,
             reopened: None,
             silent_since: None,
@@ -145,7 +147,7 @@ impl Watch {
         if self.lines.due() {
             self.lines.print(&self.writer);
             self.collect(None);
-            self.check_link();
+            self.look();
             self.write_stats();
             // A look comes once a second: the one nearest to the interval's end closes it.
             if self.interval_began.elapsed() + SECOND / 2 >= self.interval_length {
@@ -165,15 +167,15 @@ impl Watch {
             return;
         }
         self.still += 1;
-        // Opening a link may take a second; a hang in it ends like any other.
-        let reopening = self.shared.reopen.load(Relaxed);
-        if reopening && self.still < STUCK_TICKS_DEGRADED {
-            notify(WATCHDOG);
-        } else if self.still >= self.stuck_ticks {
-            abort(format!(
+        // Opening a link or a reader may take a second; a hang in it ends like any other.
+        let opening = self.shared.reopen.load(Relaxed) || self.shared.another_reader.load(Relaxed);
+        match stillness(self.still, if opening { STUCK_TICKS_DEGRADED } else { self.stuck_ticks }) {
+            Stillness::Allowed => notify(WATCHDOG),
+            Stillness::Doubtful => {}
+            Stillness::Stuck => abort(format!(
                 "the loop is stuck: no turn for {} ms; ending, so that it is started anew",
                 TICK.as_millis() * u128::from(self.still)
-            ));
+            )),
         }
     }
 
@@ -187,10 +189,23 @@ impl Watch {
         last.map(add);
     }
 
+    /// Takes what the eye saw. Where it could not see nothing is known of the link, and nothing is done to it.
+    fn look(&mut self) {
+        match self.eye.sight() {
+            Some(Ok(sight)) => {
+                self.blind = None;
+                self.check_link(sight);
+            }
+            Some(Err(why)) if self.blind.as_ref() != Some(&why) => {
+                self.writer.line(format!("whether newcomers find the link cannot be seen: {why}"));
+                self.blind = Some(why);
+            }
+            Some(Err(_)) | None => {}
+        }
+    }
+
     /// Are our ports among those that a newcomer finds? And does a publisher's data reach us?
-    fn check_link(&mut self) {
-        let (publishers, readers) = self.probe.count::<RavenState>();
-        let (poses, _) = self.probe.count::<CorrectedPose>();
+    fn check_link(&mut self, Sight { publishers, readers, poses }: Sight) {
         let counters = self.shared.counters();
         let (accepted, refused, receive_failures) = (counters[1], counters[7], counters[11]);
         let flows = std::mem::replace(&mut self.accepted, accepted) != accepted;
@@ -200,10 +215,6 @@ impl Watch {
             self.unreachable = 0;
         } else {
             self.unreachable += 1;
-            // The probe itself may hang on what was removed.
-            if let Ok(probe) = Probe::open(&self.settings) {
-                self.probe = probe;
-            }
         }
         // Services of one name share their file names: whoever leaves the old one last also removes the new one's files. So one
         // opening may not be enough, and what flows after one may be cut off again.
@@ -270,9 +281,30 @@ impl Watch {
         self.collect(last);
         self.write_log();
         self.write_stats();
+        self.eye.close();
         if !self.writer.finish(WRITE_MAX) {
             say("the last histograms could not be written in time");
         }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stillness {
+    /// Less than the loop may take: the watchdog is fed.
+    Allowed,
+    /// Unfed, the watchdog is the second line of defence.
+    Doubtful,
+    Stuck,
+}
+
+/// What so many ticks without a heartbeat are, where so many are one too many.
+fn stillness(ticks: u32, stuck: u32) -> Stillness {
+    if ticks >= stuck {
+        Stillness::Stuck
+    } else if ticks + STUCK_TICKS <= stuck {
+        Stillness::Allowed
+    } else {
+        Stillness::Doubtful
     }
 }
 
@@ -340,5 +372,22 @@ fn describe(event: &Event) -> String {
             format!("link failures: {receive} receiving, {send} sending, {readers} connecting a reader, which gets no pose")
         }
         Event::Reopened => "the link was opened anew".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_without_rights_is_fed_for_as_long_as_it_is_given_and_one_with_them_only_while_it_turns() {
+        let of = |stuck| (1..=stuck).map(|ticks| stillness(ticks, stuck)).collect::<Vec<_>>();
+        let realtime = of(STUCK_TICKS);
+        assert_eq!(realtime[..STUCK_TICKS as usize - 1], [Stillness::Doubtful; STUCK_TICKS as usize - 1]);
+        let degraded = of(STUCK_TICKS_DEGRADED);
+        let fed = degraded.iter().take_while(|tick| **tick == Stillness::Allowed).count() as u32;
+        // What is left unfed at the end is what a real-time loop has.
+        assert_eq!(fed, STUCK_TICKS_DEGRADED - STUCK_TICKS);
+        assert!([realtime, degraded].iter().all(|all| all.last() == Some(&Stillness::Stuck)));
     }
 }

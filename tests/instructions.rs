@@ -16,9 +16,9 @@ use world::MS;
 /// The compiler whose code was counted.
 const COMPILER: &str = "rustc 1.95.0";
 /// Taking a state of both arms, features, guards, correction and pose; all but the network.
-const LOOP: f64 = 4_783.0;
+const LOOP: f64 = 5_029.0;
 /// The same with a second model per arm, for the orientation.
-const BOTH: f64 = 8_655.0;
+const BOTH: f64 = 9_056.0;
 /// The 600-500-400 network in every format that AVX2 has, the widest set that valgrind knows; `i12` is stored as `i16` there.
 const NETWORK: [(&str, f64); 5] = [
     ("network-f32", 143_840.0),
@@ -105,9 +105,13 @@ fn a_cycle_takes_the_instructions_that_it_took() {
         let begun: Vec<_> = parts.iter().map(|(name, _)| scope.spawn(|| count(name))).collect();
         begun.into_iter().map(|counted| counted.join().expect("counted")).collect()
     });
+    let mut off = Vec::new();
     for ((name, expected), found) in parts.into_iter().zip(counts) {
         let Some(found) = found else { return println!("skipped: valgrind is absent") };
         println!("{name}: {found:.0} instructions per cycle, {expected} noted");
-        assert!((found / expected - 1.0).abs() <= TOLERANCE, "{name}: {found:.0} instructions per cycle, {expected} noted");
+        if (found / expected - 1.0).abs() > TOLERANCE {
+            off.push(name);
+        }
     }
+    assert!(off.is_empty(), "more or less than noted, see above: {off:?}");
 }

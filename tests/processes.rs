@@ -694,6 +694,26 @@ fn a_second_service_is_refused_and_the_first_lives_on() {
 }
 
 #[test]
+fn a_service_that_is_shut_out_of_its_directory_ends_to_be_started_anew() {
+    let _machine = machine();
+    despite_stops(|| {
+        let world = World::new("shut-out");
+        let mut service = world.start(&world.config(CONFIG), &[]);
+        common::remove_shared_memory(&world.settings.prefix);
+        std::fs::remove_dir_all(&world.settings.root).expect("removed");
+        // As a directory is that a sandbox shows read-only: nothing can be made in it.
+        std::fs::write(world.settings.root.trim_end_matches('/'), "").expect("in its place");
+        let status = service.end();
+        assert_eq!(status.code(), Some(1), "{}", world.log());
+        assert!(
+            world.log().contains("cannot be written by this process any more: ending, so that it is started anew"),
+            "{}",
+            world.log()
+        );
+    });
+}
+
+#[test]
 fn a_service_whose_files_were_removed_opens_its_link_anew() {
     if role().as_deref() == Some("publisher") {
         publish_forever();

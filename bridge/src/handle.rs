@@ -169,8 +169,8 @@ impl PoseReader {
             self.probe = Probe::open(&self.settings).ok();
         }
         let lost = self.probe.as_ref().is_some_and(|probe| {
-            let (publishers, readers) = probe.count::<CorrectedPose>();
-            readers == 0 || (publishers > 0 && self.reader.publishers() == 0)
+            let found = probe.count::<CorrectedPose>();
+            found.is_ok_and(|(publishers, readers)| readers == 0 || (publishers > 0 && self.reader.publishers() == 0))
         });
         if lost && let Ok(reader) = Reader::open(&self.settings, self.depth) {
             self.reader = reader;

@@ -54,6 +54,7 @@ enum Weights {
 
 struct Layer {
     weights: Weights,
+    outputs: usize,
     bias: Box<[Lane]>,
     activation: Activation,
 }
@@ -225,7 +226,7 @@ impl Plan {
         for lane in self.front[..self.shift.len()].iter_mut().skip(whole.len() + 1) {
             lane.0 = [0.0; LANE];
         }
-        for Layer { weights, bias, activation } in &*self.layers {
+        for Layer { weights, outputs, bias, activation } in &*self.layers {
             match weights {
                 Weights::Rows(rows) => rows.run(self.instruction_set, *activation, bias, &self.front, &mut self.back),
                 Weights::Pairs(pairs) => {
@@ -233,6 +234,10 @@ impl Plan {
                 }
                 #[cfg(target_arch = "x86_64")]
                 Weights::Tiles(tiles) => tiles.run(*activation, bias, &self.front, &mut self.digits, &mut self.back),
+            }
+            // What pads would be a half of a sigmoid, and count in the scale of the next layer's whole numbers.
+            if let (Some(last), 1..) = (self.back.get_mut(outputs / LANE), outputs % LANE) {
+                last.0[outputs % LANE..].fill(0.0);
             }
             std::mem::swap(&mut self.front, &mut self.back);
         }
@@ -257,7 +262,7 @@ impl Layer {
             }
         };
         let bias = padded(bias.as_ref().unwrap_or(&dense.bias), lanes(dense.outputs));
-        Self { weights, bias, activation: dense.activation }
+        Self { weights, outputs: dense.outputs, bias, activation: dense.activation }
     }
 }
 

@@ -90,10 +90,6 @@ impl Rows {
             "plan buffers disagree"
         );
         let out = &mut output[..lanes];
-        // What pads the last lane no kernel writes: a NaN of another layer's would stay there for ever, and zero weights do not stop it.
-        if let Some(last) = out.last_mut() {
-            last.0 = [0.0; LANE];
-        }
         match set {
             // SAFETY: `set` came from `InstructionSet::available`, which found AVX-512F; the lengths were checked above.
             #[cfg(target_arch = "x86_64")]

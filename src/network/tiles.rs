@@ -6,7 +6,7 @@
 //! digits is left out: it is zero on average and no more than what rounding the weights did.
 //!
 //! A tile is sixteen outputs by four inputs: a cache line of high digits, and one of low digits, or half of one that it shares with its
-//! neighbour. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.
+//! neighbour. There a byte is `16 a + b + 8` of the two low digits: its products as it is, less those of its lower half, are 16 times those of `a`. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.
 //!
 //! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
 //! compiled for an instruction set that was found on this machine.
@@ -39,6 +39,9 @@ fn digits(number: i32, bits: u32) -> (i32, i32) {
     (high, number - (high << bits))
 }
 
+/// What makes a low digit of half a byte positive.
+const HALF_STEPS: i32 = 8;
+
 /// Lines of one group of inputs in a panel so wide.
 const fn lines_per_group(width: usize, low: u32) -> usize {
     match low {
@@ -61,6 +64,23 @@ impl Digits {
     pub(super) fn new(lanes: usize) -> Self {
         let room = vec![Line([0; 64]); (lanes * LANE).div_ceil(64)].into_boxed_slice();
         Self { high: room.clone(), low: room, scale: 0.0 }
+    }
+
+    /// The sum of the upper digits of so many groups, 128 too large each.
+    ///
+    /// # Safety
+    /// AVX-512F and VNNI must be present, and the digits of so many groups there.
+    #[target_feature(enable = "avx512f,avx512vnni")]
+    unsafe fn tops(&self, groups: usize) -> i32 {
+        let ones = _mm512_set1_epi8(1);
+        let mut sums = _mm512_setzero_si512();
+        for first in (0..groups).step_by(LANE) {
+            let there = if groups - first < LANE { (1 << (groups - first)) - 1 } else { u16::MAX };
+            // SAFETY: a group is four bytes, and those behind the last one are not read.
+            let digits = unsafe { _mm512_maskz_loadu_epi32(there, self.high.as_ptr().cast::<i32>().add(first)) };
+            sums = _mm512_dpbusd_epi32(sums, digits, ones);
+        }
+        _mm512_reduce_add_epi32(sums)
     }
 
     /// Takes `values` in; with NaN or infinity among them the scale is NaN, and so is every output.
@@ -126,6 +146,13 @@ impl Tiles {
             lines += groups * lines_per_group(width, low);
         }
         let mut lines = vec![Line([0; 64]); lines].into_boxed_slice();
+        if low == NIBBLE {
+            // Of inputs that pad, too: those are added for all inputs at once.
+            for (first, width) in panels(tiles, low) {
+                let groups = lines[panel_of[first].2..].chunks_exact_mut(lines_per_group(width, low)).take(groups);
+                groups.for_each(|group| group[width..width + width / 2].fill(Line([HALF_STEPS as u8; 64])));
+            }
+        }
         let mut start = vec![[0; LANE]; tiles].into_boxed_slice();
         let (mut start_mixed, mut scales) = (start.clone(), super::zeros(tiles));
         for (row, (numbers, scale)) in whole.numbers.chunks_exact(whole.inputs).zip(&whole.scale).enumerate() {
@@ -146,8 +173,9 @@ impl Tiles {
                 let (rest, lows) = ((rest as i8).cast_unsigned(), group + side_by_side);
                 match low {
                     NONE => {}
-                    // Of two neighbours the first has the upper half of the byte.
-                    NIBBLE => lines[lows + in_panel / 2].0[byte] |= rest >> (in_panel % 2 * NIBBLE as usize),
+                    // Of two neighbours the first has the upper half of the byte, the other the lower, which stands at its middle.
+                    NIBBLE if in_panel.is_multiple_of(2) => lines[lows + in_panel / 2].0[byte] |= rest,
+                    NIBBLE => lines[lows + in_panel / 2].0[byte] ^= (rest >> NIBBLE) & 0x0f,
                     _ => lines[lows + in_panel].0[byte] = rest,
                 }
             }
@@ -181,6 +209,8 @@ impl Tiles {
         let lanes = (self.groups * DEPTH).div_ceil(LANE);
         assert!(input.len() >= lanes && bias.len() >= self.across && output.len() >= self.across, "plan buffers disagree");
         digits.take(&input[..lanes]);
+        // SAFETY: of so many lanes the digits were just taken.
+        let eighths = if LOW == NIBBLE { unsafe { digits.tops(self.groups) }.wrapping_mul(HALF_STEPS) } else { 0 };
         let mut lines = &*self.lines;
         for (first, width) in panels(self.across, LOW) {
             let (panel, behind) = lines.split_at(self.groups * lines_per_group(width, LOW));
@@ -188,14 +218,14 @@ impl Tiles {
             // SAFETY: the caller's promise; the panel begins at a tile that exists and is `width` tiles wide, and these are its lines.
             unsafe {
                 match width {
-                    1 => self.panel::<1, 4, LOW>(panel, first, bias, digits, output),
-                    2 => self.panel::<2, 4, LOW>(panel, first, bias, digits, output),
-                    3 => self.panel::<3, 2, LOW>(panel, first, bias, digits, output),
-                    4 => self.panel::<4, 2, LOW>(panel, first, bias, digits, output),
-                    5 => self.panel::<5, 1, LOW>(panel, first, bias, digits, output),
-                    6 => self.panel::<6, 1, LOW>(panel, first, bias, digits, output),
-                    7 => self.panel::<7, 1, LOW>(panel, first, bias, digits, output),
-                    _ => self.panel::<8, 1, LOW>(panel, first, bias, digits, output),
+                    1 => self.panel::<1, 4, LOW>(panel, first, bias, digits, eighths, output),
+                    2 => self.panel::<2, 4, LOW>(panel, first, bias, digits, eighths, output),
+                    3 => self.panel::<3, 2, LOW>(panel, first, bias, digits, eighths, output),
+                    4 => self.panel::<4, 2, LOW>(panel, first, bias, digits, eighths, output),
+                    5 => self.panel::<5, 1, LOW>(panel, first, bias, digits, eighths, output),
+                    6 => self.panel::<6, 1, LOW>(panel, first, bias, digits, eighths, output),
+                    7 => self.panel::<7, 1, LOW>(panel, first, bias, digits, eighths, output),
+                    _ => self.panel::<8, 1, LOW>(panel, first, bias, digits, eighths, output),
                 }
             }
             // While the next panel's weights are on their way.
@@ -215,11 +245,12 @@ impl Tiles {
         first: usize,
         bias: &[Lane],
         digits: &Digits,
+        eighths: i32,
         output: &mut [Lane],
     ) {
         let (high, low) = (digits.high.as_ptr().cast::<i32>(), digits.low.as_ptr().cast::<i32>());
         let scale = _mm512_set1_ps(digits.scale);
-        let upper_halves = _mm512_set1_epi32(0xf0f0_f0f0_u32.cast_signed());
+        let lower_halves = _mm512_set1_epi8(0x0f);
         let none = [[_mm512_setzero_si512(); N]; DEEP];
         let (mut tops, mut rests, mut crossed) = (none, none, none);
         // SAFETY: `panels` checked the lengths and `new` made them: `groups` words of activations, as many times the lines of a group, a
@@ -234,10 +265,9 @@ impl Tiles {
                     rests[deep][tile] = _mm512_dpbusd_epi32(rests[deep][tile], rest, weight);
                     let low = match LOW {
                         NONE => continue,
-                        NIBBLE => {
-                            let pair = _mm512_load_si512(w.add(N + tile / 2));
-                            _mm512_and_si512(if tile % 2 == 0 { pair } else { _mm512_slli_epi32::<NIBBLE>(pair) }, upper_halves)
-                        }
+                        // Both halves of the byte, and the lower one alone.
+                        NIBBLE if tile % 2 == 0 => _mm512_load_si512(w.add(N + tile / 2)),
+                        NIBBLE => _mm512_and_si512(_mm512_load_si512(w.add(N + tile / 2)), lower_halves),
                         _ => _mm512_load_si512(w.add(N + tile)),
                     };
                     crossed[deep][tile] = _mm512_dpbusd_epi32(crossed[deep][tile], top, low);
@@ -255,14 +285,31 @@ impl Tiles {
             for group in whole..self.groups {
                 add(group, 0);
             }
+            let mut sums = crossed[0];
+            for other in &crossed[1..] {
+                for (sum, other) in sums.iter_mut().zip(other) {
+                    *sum = _mm512_add_epi32(*sum, *other);
+                }
+            }
             for tile in 0..N {
                 let at = first + tile;
                 let start = |of: &[[i32; LANE]]| _mm512_loadu_si512(of[at].as_ptr().cast());
-                let (mut top, mut rest) = (start(&self.start), start(&self.start_mixed));
+                let mut top = start(&self.start);
+                // Without low digits both start alike.
+                let mut rest = if LOW == NONE { top } else { start(&self.start_mixed) };
                 for deep in 0..DEEP {
                     top = _mm512_add_epi32(top, tops[deep][tile]);
-                    rest = _mm512_add_epi32(rest, _mm512_add_epi32(rests[deep][tile], crossed[deep][tile]));
+                    rest = _mm512_add_epi32(rest, rests[deep][tile]);
                 }
+                let crossed = match LOW {
+                    NONE => _mm512_setzero_si512(),
+                    NIBBLE if tile % 2 == 1 => {
+                        _mm512_slli_epi32::<NIBBLE>(_mm512_sub_epi32(sums[tile], _mm512_set1_epi32(eighths)))
+                    }
+                    NIBBLE if tile + 1 < N => _mm512_sub_epi32(sums[tile], sums[tile + 1]),
+                    _ => sums[tile],
+                };
+                rest = _mm512_add_epi32(rest, crossed);
                 let sum = _mm512_fmadd_ps(_mm512_cvtepi32_ps(top), _mm512_set1_ps(256.0), _mm512_cvtepi32_ps(rest));
                 let factor = _mm512_mul_ps(scale, _mm512_load_ps(self.scale[at].0.as_ptr()));
                 _mm512_store_ps(output[at].0.as_mut_ptr(), _mm512_fmadd_ps(sum, factor, _mm512_load_ps(bias[at].0.as_ptr())));

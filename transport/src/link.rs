@@ -431,6 +431,7 @@ impl<T: Message> Reader<T> {
 /// new service: nothing tells the old ones. A port that a newcomer cannot see must be opened anew.
 pub struct Probe {
     node: Node<ipc::Service>,
+    settings: Settings,
 }
 
 impl Probe {
@@ -439,16 +440,28 @@ impl Probe {
     /// # Errors
     /// [`TransportError::Node`].
     pub fn open(settings: &Settings) -> Result<Self, TransportError> {
-        node(settings).map(|node| Self { node })
+        node(settings).map(|node| Self { node, settings: settings.clone() })
     }
 
-    /// Publishers and readers that a newcomer finds; zeros where there is no such service.
-    pub fn count<T: Message>(&self) -> (usize, usize) {
-        let Ok(name) = ServiceName::new(T::SERVICE) else { return (0, 0) };
-        self.node.service_builder(&name).publish_subscribe::<T>().open().map_or((0, 0), |service| {
-            let peers = service.dynamic_config();
-            (peers.number_of_publishers(), peers.number_of_subscribers())
-        })
+    /// Publishers and readers that a newcomer finds; zeros where there is no such service, or not all of its files.
+    ///
+    /// # Errors
+    /// [`TransportError::Service`] where nobody can tell: a full disk, no descriptor free.
+    pub fn count<T: Message>(&self) -> Result<(usize, usize), TransportError> {
+        let name = ServiceName::new(T::SERVICE).map_err(|cause| TransportError::service(T::SERVICE, &self.settings, &cause))?;
+        match self.node.service_builder(&name).publish_subscribe::<T>().open() {
+            Ok(service) => {
+                let peers = service.dynamic_config();
+                Ok((peers.number_of_publishers(), peers.number_of_subscribers()))
+            }
+            Err(
+                PublishSubscribeOpenError::DoesNotExist
+                | PublishSubscribeOpenError::ServiceInCorruptedState
+                | PublishSubscribeOpenError::HangsInCreation
+                | PublishSubscribeOpenError::IsMarkedForDestruction,
+            ) => Ok((0, 0)),
+            Err(cause) => Err(TransportError::service(T::SERVICE, &self.settings, &cause)),
+        }
     }
 }
 
