@@ -13,12 +13,20 @@ pub(crate) fn run(core: Option<usize>, priority: i32, spins: bool, seconds: u64)
         return Err(format!("--priority {priority} is outside 1 to 95 (RAVEN's controller runs at 96)"));
     }
     let mut findings = examine(&Question { sysroot: Path::new("/"), core, priority, spins });
+    findings.iter().for_each(show);
     if seconds > 0 {
-        let wakeup = measure_wakeup(Duration::from_secs(seconds), core, priority);
-        findings.push(wakeup.map_err(|cause| format!("wake-up latency cannot be measured: {cause}; use --seconds 0"))?.finding());
-    }
-    for finding in &findings {
-        show(finding);
+        let measured = measure_wakeup(Duration::from_secs(seconds), core, priority);
+        let wakeup = measured.map_or_else(
+            |cause| Finding {
+                id: "wakeup",
+                level: Level::Fail,
+                found: format!("cannot be measured: {cause}"),
+                remedy: Some("mend what stands above; --seconds 0 leaves it out".to_owned()),
+            },
+            |measured| measured.finding(),
+        );
+        show(&wakeup);
+        findings.push(wakeup);
     }
     let count = |level: Level| findings.iter().filter(|finding| finding.level == level).count();
     say!("\n{} requirements not met, {} warnings, {} checks", count(Level::Fail), count(Level::Warn), findings.len());

@@ -8,7 +8,7 @@ use recordings::cut::{CutSource, CutTable, Stretch};
 use recordings::open::{Kind, Opened, kind, open};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::states::{self, Arms};
-use recordings::stream::{Damage, Record, Source, Truth};
+use recordings::stream::{Channel, Damage, Record, Source, Truth};
 use recordings::table::{self, TableSource};
 use recordings::tidy;
 use recordings::{Recording, csv};
@@ -87,9 +87,28 @@ fn note_all(losses: &[&str]) {
     }
 }
 
+/// What the lab's wide text holds that is neither state nor truth. Made of it, another file says so too and has lost it before.
+fn note_left_out(input: &Path, metadata: &[(String, String)]) {
+    if kind(input).is_ok_and(|kind| kind == Kind::Columns252) {
+        metadata.iter().filter(|(key, _)| key == "left_out").for_each(|(_, what)| say!("note: {what}"));
+    }
+}
+
+fn note_unread(channels: &[Channel]) {
+    for channel in channels.iter().filter(|channel| !channel.is_read && channel.messages > 0) {
+        say!(
+            "note: {} messages on {} ({}) are not in it: states and truth are converted",
+            channel.messages,
+            channel.topic,
+            channel.type_name
+        );
+    }
+}
+
 fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, format: StateFormat) -> Result<ExitCode, String> {
     note_all(format.losses());
     let metadata = source.metadata().to_vec();
+    note_left_out(input, &metadata);
     let mut sink = save::create_states(out, format, &metadata).map_err(|error| error.to_string())?;
     let mut progress = Progress::bytes();
     let records = save::copy_states(source.as_mut(), sink.as_mut(), &mut |done, total| progress.at(done, total));
@@ -99,14 +118,7 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
         return Err(nothing_of(input, "state", source.damage()));
     }
     sink.finish().map_err(|error| error.to_string())?;
-    for channel in source.channels().iter().filter(|channel| !channel.is_read && channel.messages > 0) {
-        say!(
-            "note: {} messages on {} ({}) are not in it: states and truth are converted",
-            channel.messages,
-            channel.topic,
-            channel.type_name
-        );
-    }
+    note_unread(&source.channels());
     say!("{}: of {records} records", out.display());
     Ok(source.damage().map_or(ExitCode::SUCCESS, |damage| told_of(input, damage, "converted")))
 }
@@ -114,6 +126,7 @@ fn states_to_states(input: &Path, mut source: Box<dyn Source>, out: &Path, forma
 fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, format: TableFormat) -> Result<ExitCode, String> {
     let metadata = source.metadata().to_vec();
     let columns = source.columns().to_vec();
+    note_left_out(input, &metadata);
     let mut sink = save::create_table(out, format, &columns, &metadata).map_err(|error| error.to_string())?;
     let mut progress = Progress::bytes();
     let rows = table::copy(source.as_mut(), sink.as_mut(), &mut |done, total| progress.at(done, total));
@@ -123,6 +136,7 @@ fn table_to_table(input: &Path, mut source: Box<dyn TableSource>, out: &Path, fo
         return Err(nothing_of(input, "row", source.damage()));
     }
     sink.finish().map_err(|error| error.to_string())?;
+    note_unread(&source.channels());
     say!("{}: {rows} rows, {} columns", out.display(), columns.len());
     Ok(told(input, source.as_ref(), "converted"))
 }

@@ -145,7 +145,7 @@ fn write(outcome: &Outcome, out: &Path) -> Result<(), String> {
     std::fs::create_dir_all(out).map_err(|error| format!("{}: cannot be made: {error}", out.display()))?;
     let corrected = out.join("corrected.toml");
     match &outcome.corrected {
-        Some(text) => output::whole(&corrected, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?,
+        Some(text) => output::all(&corrected, text.as_bytes())?,
         // One of an earlier analysis would pass for this one's.
         None => drop(std::fs::remove_file(&corrected)),
     }

@@ -3,15 +3,14 @@
 use std::fmt::Arguments;
 use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Writes through `write` into a file beside `path`, then renames it; on any failure nothing is left.
 pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), String>) -> Result<(), String> {
-    let mut aside = path.as_os_str().to_owned();
-    aside.push(format!(".{}.new", std::process::id()));
-    let aside = PathBuf::from(aside);
-    let failed =
-        |cause: std::io::Error| format!("{}: cannot be written: {cause}; check the folder and its permissions", path.display());
+    // Hidden, for one that a signal leaves behind.
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let aside = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+    let failed = |cause: std::io::Error| unwritten(path, &cause);
     let file = File::create(&aside).map_err(failed)?;
     let mut buffered = BufWriter::new(file);
     let written = write(&mut buffered)
@@ -22,6 +21,17 @@ pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<()
         let _ = fs::remove_file(&aside);
     }
     written
+}
+
+/// Writes bytes so.
+pub(crate) fn all(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    whole(path, |file| file.write_all(bytes).map_err(|cause| unwritten(path, &cause)))
+}
+
+fn unwritten(path: &Path, cause: &std::io::Error) -> String {
+    let remedy =
+        if cause.kind() == ErrorKind::StorageFull { "make room on that disk" } else { "check the folder and its permissions" };
+    format!("{}: cannot be written: {cause}; {remedy}", path.display())
 }
 
 /// Does an output replace none of the inputs?

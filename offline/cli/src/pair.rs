@@ -95,10 +95,10 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         recording_with_truth(wish, &paired, side, format)?;
     } else {
         let text = table(&paired, &recording);
-        output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+        output::all(out, text.as_bytes())?;
     }
     let report = out.with_extension("report.json");
-    output::whole(&report, |file| file.write_all(paired.report.to_json().as_bytes()).map_err(|error| error.to_string()))?;
+    output::all(&report, paired.report.to_json().as_bytes())?;
     output::say(format_args!("{}", paired.report));
     say!("{}: {} pairs; {}: the report", out.display(), paired.pairs.len(), report.display());
     if let Some(cameras) = wish.register {

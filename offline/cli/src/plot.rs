@@ -17,7 +17,7 @@ pub(crate) fn run(input: &Path, out: &Path) -> Result<ExitCode, String> {
     let options = plot::Options::default();
     let page = if svg { plot::overview_svg(&recording, &options) } else { plot::overview(&recording, &options) };
     let page = page.map_err(|error| error.to_string())?;
-    output::whole(out, |file| file.write_all(page.as_bytes()).map_err(|error| error.to_string()))?;
+    output::all(out, page.as_bytes())?;
     say!("{}: {} kB", out.display(), page.len() / 1000);
     Ok(status)
 }

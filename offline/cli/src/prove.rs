@@ -63,7 +63,7 @@ fn begin(wish: &Wish, tool_sha256: &str) -> Result<(), String> {
         if wish.out.join("manifest.json").exists() {
             return Err(format!("{}: holds another trial; give another --out", wish.out.display()));
         }
-        return output::whole(&path, |file| writeln!(file, "{now:#}").map_err(|error| error.to_string()));
+        return output::all(&path, format!("{now:#}\n").as_bytes());
     }
     let begun: Value =
         serde_json::from_slice(&read(&path)?).map_err(|error| format!("{}: {error}; remove the folder", path.display()))?;

@@ -78,7 +78,7 @@ pub(crate) fn write(cameras: &Path, found: &RegistrationReport, from: &str) -> R
     );
     // What was put together must read as it was meant.
     let _ = parsed(cameras, &whole)?;
-    output::whole(cameras, |file| file.write_all(whole.as_bytes()).map_err(|error| error.to_string()))
+    output::all(cameras, whole.as_bytes())
 }
 
 /// The section of a file that is to be written anew, with the comment above it; none where there is no such file, or none in it.

@@ -13,7 +13,11 @@ const AGE_MAX_S: u64 = 5;
 pub(crate) fn run(runtime_dir: &Path, watch: bool, hgrm: Option<&Path>) -> Result<ExitCode, String> {
     let path = runtime_dir.join("stats.json");
     if let Some(hgrm) = hgrm {
-        write_hgrm(&read(&path)?, hgrm)?;
+        let stats = read(&path)?;
+        if let Some(why) = not_running(&stats) {
+            return Err(format!("{}: {why}; no histograms are written of what does not run: start ravenposed", path.display()));
+        }
+        write_hgrm(&stats, hgrm)?;
     }
     loop {
         let stats = read(&path)?;
@@ -26,14 +30,19 @@ pub(crate) fn run(runtime_dir: &Path, watch: bool, hgrm: Option<&Path>) -> Resul
             std::thread::sleep(Duration::from_secs(1));
         } else {
             output::say(format_args!("{}", table(&stats)));
-            return Ok(ExitCode::SUCCESS);
+            return Ok(if not_running(&stats).is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS });
         }
     }
 }
 
 fn read(path: &Path) -> Result<Stats, String> {
     let text = std::fs::read(path).map_err(|cause| {
-        format!("{}: {cause}; is ravenposed running? give its report.runtime_dir with --runtime-dir", path.display())
+        let remedy = if cause.kind() == std::io::ErrorKind::PermissionDenied {
+            "run this as the service's user, or as a member of its group"
+        } else {
+            "is ravenposed running? give its report.runtime_dir with --runtime-dir"
+        };
+        format!("{}: {cause}; {remedy}", path.display())
     })?;
     let stats: Stats = serde_json::from_slice(&text).map_err(|cause| {
         format!("{}: not statistics of this version ({cause}); use the ravenpose of the service", path.display())
@@ -48,11 +57,23 @@ fn read(path: &Path) -> Result<Stats, String> {
     Ok(stats)
 }
 
-fn table(stats: &Stats) -> String {
+/// Why the service that wrote this does not run; none if it does.
+fn not_running(stats: &Stats) -> Option<String> {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let age = now.saturating_sub(stats.written_unix_s);
+    let (age, ahead) = (now.saturating_sub(stats.written_unix_s), stats.written_unix_s.saturating_sub(now));
+    let stopping = stats.arms.iter().any(|arm| arm.flags.iter().any(|flag| flag == "stopping"));
+    if stopping {
+        Some(format!("NOT RUNNING: stopped {age} s ago"))
+    } else if age > AGE_MAX_S {
+        Some(format!("NOT RUNNING: last statistics {age} s ago"))
+    } else {
+        (ahead > AGE_MAX_S).then(|| format!("NOT KNOWN TO RUN: last statistics {ahead} s ahead of this machine's clock"))
+    }
+}
+
+fn table(stats: &Stats) -> String {
     let mut text = String::new();
-    let state = if age > AGE_MAX_S { format!("NOT RUNNING: last statistics {age} s ago") } else { "running".to_owned() };
+    let state = not_running(stats).unwrap_or_else(|| "running".to_owned());
     let _ = writeln!(text, "ravenposed {state}, pid {}, up {} s", stats.pid, stats.uptime_s);
     for arm in &stats.arms {
         let model = if arm.model.is_empty() { "no model" } else { &arm.model };
@@ -88,14 +109,15 @@ fn table(stats: &Stats) -> String {
 }
 
 fn write_hgrm(stats: &Stats, hgrm: &Path) -> Result<(), String> {
+    if hgrm.is_dir() || hgrm.file_name().is_none() || hgrm.to_string_lossy().ends_with('/') {
+        return Err(format!("--hgrm {}: is a folder; name a file in it, such as run.hgrm", hgrm.display()));
+    }
     let extension = hgrm.extension().map_or_else(|| "hgrm".into(), |e| e.to_string_lossy().into_owned());
     let stem = hgrm.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     for stage in &stats.stages {
         let histogram = stage.histogram().ok_or(format!("the histogram of {} is damaged; try again", stage.name))?;
         let path: PathBuf = hgrm.with_file_name(format!("{stem}.{}.{extension}", stage.name));
-        output::whole(&path, |file| {
-            file.write_all(report::hgrm(&histogram).as_bytes()).map_err(|cause| format!("{}: {cause}", path.display()))
-        })?;
+        output::all(&path, report::hgrm(&histogram).as_bytes())?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use crate::output;
 use crate::progress::Progress;
+use crate::read::PARTLY;
 use crate::registration;
 use ::vision::commands::{self, Calibrated};
 use ::vision::marking::Marking;
@@ -120,7 +121,7 @@ fn calibrate(rig: &Path, out: &Path, mode: Mode) -> Result<ExitCode, String> {
     let found = commands::calibrate(rig, mode).map_err(|error| error.to_string())?;
     let kept = registration::kept(out);
     let text = commands::cameras_text(&found) + kept.as_deref().unwrap_or_default();
-    output::whole(out, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+    output::all(out, text.as_bytes())?;
     let _ = output::say(format_args!("{}", calibrated_words(&found)));
     if kept.is_some() {
         say!(
@@ -180,6 +181,13 @@ fn tracked_words(tracked: &Tracked) -> String {
             lines.push(format!("frame {} lost: {}", row.frame, lost.words(&tracked.balls)));
         }
     }
+    lines.extend(tracked.moved().map(|(camera, [odd, seen])| {
+        format!(
+            "{}: contradicts the others, or shows no ball where they see it, in {odd} of the {seen} frames of which it has an image; if nothing is in \
+             its way it has moved: calibrate anew",
+            tracked.cameras[camera]
+        )
+    }));
     for remark in tracked.rows.iter().flat_map(|row| &row.remarks) {
         lines.push(remark.clone());
     }
@@ -264,7 +272,17 @@ fn record(
     let made = made.map_err(|error| error.to_string())?;
     let images: Vec<String> = names.iter().zip(&made.images).map(|(name, count)| format!("{name} {count}")).collect();
     say!("{}: {} frames; images: {}", out.display(), made.frames, images.join(", "));
-    Ok(ExitCode::SUCCESS)
+    let mut status = ExitCode::SUCCESS;
+    for (name, damaged) in names.iter().zip(&made.damaged).filter(|(_, damaged)| **damaged > 0) {
+        complain!("ravenpose: camera {name}: {damaged} images were damaged and are left out");
+        status = ExitCode::from(PARTLY);
+    }
+    for (camera, after_s, said) in &made.ended {
+        let said = said.as_deref().unwrap_or("its video is shorter than another");
+        complain!("ravenpose: camera {}: ended after {after_s:.1} s: {said}; record again what is missing", names[*camera]);
+        status = ExitCode::from(PARTLY);
+    }
+    Ok(status)
 }
 
 fn mark(rig: &Path, images: Option<&Path>, port: u16) -> Result<ExitCode, String> {

@@ -62,6 +62,9 @@ fn a_simulated_run_has_every_state_and_its_truth_and_converts_to_everything() {
         let other = folder.file(&format!("other.{ending}"));
         done(&["convert", text(&run), text(&other)]);
         done(&["info", text(&other)]);
+        let again = done(&["convert", text(&other), text(&folder.file("again.csv"))]);
+        let said = String::from_utf8_lossy(&again.stdout).contains("columns 4-11 (CRTK joints) are neither state nor truth");
+        assert_eq!(said, ending == "252.csv", "{again:?}");
     }
     let page = folder.file("run.html");
     done(&["plot", text(&run), "--out", text(&page)]);
@@ -406,4 +409,31 @@ fn a_second_simulation_does_not_overwrite_the_first() {
     let before = std::fs::read(out.join("run_0001.mcap")).expect("run");
     refused(&simulate(&out, &["--arm", "green"]), &["is there already"]);
     assert_eq!(std::fs::read(out.join("run_0001.mcap")).expect("run"), before);
+}
+
+#[test]
+fn commands_are_those_of_the_arm_that_the_recording_is_of_and_no_file_of_the_user_is_touched() {
+    let folder = Folder::new("arm-of-commands");
+    let out = folder.file("runs");
+    assert!(simulate(&out, &["--arm", "green"]).status.success());
+    let (run, table) = (out.join("run_0001.mcap"), folder.file("run.csv"));
+    done(&["convert", text(&run), text(&table)]);
+    let again = folder.file("again");
+    for file in [&run, &table] {
+        let commands = ["simulate", "--robot", "raven2-worn", "--commands", text(file), "--out", text(&again)];
+        refused(&ravenpose(&commands), &["is of the green arm, not of the gold one", "--arm green"]);
+        assert!(!again.exists());
+    }
+    // A table is made of states, through a file of its own.
+    std::fs::create_dir(&again).expect("folder");
+    let own = again.join("run_0001.states.mcap");
+    std::fs::write(&own, "mine").expect("written");
+    let green = ["--commands", text(&run), "--arm", "green", "--seed", "5", "--format", "csv"];
+    done(&[&["simulate", "--robot", "raven2-worn", "--out", text(&again)], &green[..]].concat());
+    assert_eq!(std::fs::read_to_string(&own).expect("still there"), "mine");
+    assert_eq!(std::fs::read_dir(&again).expect("folder").count(), 3, "the run, the summary, the user's file");
+    let summary = std::fs::read_to_string(again.join("simulation.txt")).expect("summary");
+    assert!(summary.contains("arm = green") && summary.contains("seed = 5") && summary.contains("homing seed 5"), "{summary}");
+    let metadata = csv::read(&again.join("run_0001.csv")).expect("run").metadata;
+    assert_eq!(["seed", "homing_seed"].map(|key| metadata.get(key).map(String::as_str)), [Some("5"); 2]);
 }

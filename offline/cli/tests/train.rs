@@ -295,6 +295,12 @@ fn evaluate_judges_on_unseen_runs_and_says_so() {
     let json = std::fs::read(report.join("report.json")).expect("report");
     let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
     assert_eq!(json["format"], "ravenpose-evaluation/1");
+    // The same run twice would count as two.
+    let copy = folder.file("copy.mcap");
+    std::fs::copy(runs[3], &copy).expect("copied");
+    let twice = ravenpose(&["evaluate", "--alone", "--model", text(&out), "--out", text(&report), "--data", runs[3], text(&copy)]);
+    let error = String::from_utf8_lossy(&twice.stderr).into_owned();
+    assert!(twice.status.code() == Some(2) && error.contains("the same run twice"), "{error}");
 }
 
 #[test]

@@ -359,10 +359,10 @@ fn analyse_with(
     let extents: Vec<Extent> = runs.iter().map(|(real, _)| real.extent()).collect();
     let (train, held) = split(runs);
     let train_s: f64 = train.iter().map(|(run, _)| run.len() as f64 * run.dt_s).sum();
-    let moment = train.iter().chain(&held).map(|(run, _)| run).find(|run| (run.len() as f64) * run.dt_s < MOMENT_S);
+    let runs = train.iter().chain(&held).map(|(run, _)| run);
+    let moment = runs.filter(|_| train_s >= SHORTEST_S).find(|run| (run.len() as f64) * run.dt_s < MOMENT_S);
     if train_s < SHORTEST_S || moment.is_some() {
-        quality
-            .insert(0, if train_s < SHORTEST_S { too_short(train_s) } else { moment.map_or_else(|| too_short(train_s), a_moment) });
+        quality.insert(0, moment.map_or_else(|| too_short(train_s), a_moment));
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     progress("smoothing");
@@ -376,11 +376,9 @@ fn analyse_with(
     let seen_s: f64 = train.iter().map(|pair| pair.real.rows.len() as f64 * band.for_period(pair.real.run.dt_s).step_s).sum();
     let empty = train.iter().chain(&held).map(|pair| &pair.real).find(|real| real.rows.len() < LEAST_ROWS);
     if seen_s < 0.5 * SHORTEST_S || empty.is_some() {
-        if let Some((run, rows)) = train.iter().chain(&held).find_map(|pair| Some((&pair.real.run, pair.real.run.rows_apart()?))) {
-            quality.insert(0, seldom_read(run, rows));
-            return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
-        }
-        quality.insert(0, too_few(seen_s, empty.filter(|_| seen_s >= 0.5 * SHORTEST_S).map(|real| real.run.id.as_str())));
+        let seldom = train.iter().chain(&held).find_map(|pair| Some(seldom_read(&pair.real.run, pair.real.run.rows_apart()?)));
+        let empty = empty.filter(|_| seen_s >= 0.5 * SHORTEST_S).map(|real| real.run.id.as_str());
+        quality.insert(0, seldom.unwrap_or_else(|| too_few(seen_s, empty)));
         return Ok(verdicts::insufficient(&robot, &extents, given, options, quality, begun));
     }
     fits(&train, train_s, robot.joint_count(), options.free_bytes)?;

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::csv;
-use crate::stream::{Damage, StreamError};
+use crate::stream::{Channel, Damage, StreamError};
 use crate::{Column, Recording, TextColumn};
 
 /// Rows of a full batch of a table of usual width.
@@ -171,6 +171,11 @@ pub trait TableSource {
     /// After the end: cells whose content could not be kept and that are taken as missing; a finding tells which.
     fn cells_lost(&self) -> u64 {
         0
+    }
+
+    /// After the end: the channels of the recording that the table is made from. Empty where it is a table itself.
+    fn channels(&self) -> Vec<Channel> {
+        Vec::new()
     }
 }
 

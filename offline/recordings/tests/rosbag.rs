@@ -8,6 +8,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
+use arm::Side;
 use common::Scratch;
 use ravenpose_wire::RavenState;
 use recordings::ros::{JOINT_STATE, JointState, MessageType, RAVEN_STATE, encode_state};
@@ -181,18 +182,49 @@ fn encoded(state: &RavenState) -> Vec<u8> {
     bytes
 }
 
+/// The lab's encoders.
+fn external() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let joints = JointState { position: vec![0.1, 0.2, 0.3], ..JointState::default() };
+    joints.encode(&["joint1", "joint2", "joint3"], &mut bytes);
+    bytes
+}
+
 /// What a chunk of RAVEN's own recording holds: states, another topic, the lab's encoders.
 fn recorded(states: &[RavenState]) -> Vec<u8> {
     const CHATTER: MessageType = MessageType { name: "std_msgs/String", md5: "", definition: "string data\n" };
-    let joints = JointState { position: vec![0.1, 0.2, 0.3], ..JointState::default() };
-    let mut external = Vec::new();
-    joints.encode(&["joint1", "joint2", "joint3"], &mut external);
+    let external = external();
     let mut records = [connection(0, "/ravenstate", &RAVEN_STATE), connection(1, "/chatter", &CHATTER)].concat();
     for (index, state) in states.iter().enumerate() {
         records.extend(message(0, index as u32, &encoded(state)));
     }
     records.extend([message(1, 3, &[0; 4]), connection(2, "/ext_jpos", &JOINT_STATE), message(2, 4, &external)].concat());
     records
+}
+
+#[test]
+fn joints_measured_before_the_first_state_are_of_the_arm_that_it_tells() {
+    let of = |type_: [i32; 2]| {
+        let mut state = RavenState::new();
+        state.type_.copy_from_slice(&type_);
+        let joints = [connection(0, "/ext_jpos", &JOINT_STATE), message(0, 1, &external()), message(0, 2, &external())].concat();
+        let records =
+            [joints, connection(1, "/ravenstate", &RAVEN_STATE), message(1, 3, &encoded(&state)), message(0, 4, &external())];
+        let (found, ..) = outcome(&[start(), chunk("none", 0, &[]), records.concat()].concat());
+        let truths = found.iter().filter_map(|record| match record {
+            Record::Truth(truth) => Some((truth.side, truth.time_ns / 1_000_000_000)),
+            Record::State(_) => None,
+        });
+        assert!(matches!(found[2], Record::State(_)), "in the order of the file");
+        truths.collect::<Vec<_>>()
+    };
+    for (types, side) in [([0, 2], Side::Green), ([1, 0], Side::Gold), ([1, 2], Side::Gold)] {
+        assert_eq!(of(types), [(side, 1), (side, 2), (side, 4)]);
+    }
+    // Of a bag without a state nothing says it.
+    let joints = [connection(0, "/ext_jpos", &JOINT_STATE), message(0, 1, &external())].concat();
+    let (found, ..) = outcome(&[start(), chunk("none", 0, &[]), joints].concat());
+    assert!(matches!(&found[..], [Record::Truth(truth)] if truth.side == Side::Gold));
 }
 
 fn check_recorded(found: &[Record], states: &[RavenState]) {

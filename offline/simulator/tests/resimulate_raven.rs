@@ -9,7 +9,7 @@ use recordings::csv;
 use simulator::model::RobotModel;
 use simulator::plant::{Dragged, Given, Vector};
 use simulator::replay::{MotorRecord, Replay};
-use simulator::resimulate::{ClosedLoop, Motion, OpenLoop, Run, closed_loop, inverse, open_loop};
+use simulator::resimulate::{ClosedLoop, Commands, Motion, OpenLoop, Run, closed_loop, inverse, open_loop};
 use simulator::trajectory::{WORKSPACE, teleoperation};
 use simulator::{Command, CycleOfArm, Robot, Simulation};
 
@@ -52,6 +52,24 @@ fn the_commands_of_a_simulated_run_give_that_run() {
         assert!((recording.column("x_m").expect("x")[5] - found.tip[5][0]).abs() < 1e-15);
         assert!(recording.column("jpos_d_7_rad").is_some() && recording.column("truth_jpos_3_m").is_some());
     }
+}
+
+#[test]
+fn joints_of_the_tool_without_commands_stand_at_home() {
+    let model = RobotModel::raven(Robot::nominal(), Side::Gold);
+    let home = Robot::nominal().raven.plant().limits.home;
+    let of = |names: &str, values: &str| {
+        let text = format!("t_s,jpos_d_1_rad,jpos_d_2_rad,jpos_d_3_m{names}\n0,0.5,1.5,-0.3{values}\n0.001,0.5,1.5,-0.3{values}\n");
+        let recording = csv::read_text("commands", text.as_bytes()).expect("recording");
+        *Commands::of_run(&model, &Run::from_recording(&recording, &model).expect("run")).expect("commands").first()
+    };
+    assert!(home[3..].iter().any(|angle| *angle != 0.0));
+    assert_eq!(of("", "")[3..7], home[3..]);
+    // A log of states has their columns.
+    assert_eq!(of(",jpos_d_4_rad,jpos_d_5_rad,jpos_d_6_rad,jpos_d_7_rad", ",0,0,0,0")[3..7], home[3..]);
+    let one = of(",jpos_d_5_rad", ",0.25");
+    assert_eq!((one[3], one[4], &one[5..7]), (home[3], 0.25, &home[5..]));
+    assert_eq!(of(",jpos_d_4_rad,jpos_d_5_rad", ",0,0.25")[3..5], [0.0, 0.25]);
 }
 
 #[test]

@@ -288,15 +288,14 @@ mod tests {
     #[test]
     fn rows_with_an_unsettled_memory_and_the_best_of_few_runs_make_no_bound() {
         // Errors of 5 until the memory has settled, then of 1; and a run of 2.
-        let of = |settled: f32| {
+        let of = |settled: f32, after: usize| {
             let labels: Vec<f32> = (0..100).map(|row| if row < 30 { 5.0 } else { settled }).collect();
             let time_s = (0..100).map(f64::from).collect();
-            let (inputs, young_places) = (vec![0.0; 100], vec![0.0; 100]);
-            Trajectory { time_s, inputs, young_places, labels, settled_after_s: Some(30.0), ..Trajectory::default() }
+            let is_unsettled = (0..100).map(|row| row < after).collect();
+            Trajectory { time_s, inputs: vec![0.0; 100], is_unsettled, labels, ..Trajectory::default() }
         };
-        assert_eq!(bounds(&chain_of_nothing(1), &[of(1.0)]), [1.0]);
-        assert_eq!(bounds(&chain_of_nothing(1), &[of(2.0), of(1.0)]), [2.0]);
-        let never = Trajectory { settled_after_s: None, ..of(1.0) };
-        assert_eq!(bounds(&chain_of_nothing(1), &[never]), [5.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[of(1.0, 30)]), [1.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[of(2.0, 30), of(1.0, 30)]), [2.0]);
+        assert_eq!(bounds(&chain_of_nothing(1), &[of(1.0, 100)]), [5.0]);
     }
 }

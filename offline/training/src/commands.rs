@@ -161,15 +161,15 @@ pub(crate) fn read_parts(
     Ok((set, parts, load.ok()))
 }
 
-/// A run that is given twice, whole or in part, would be in two sets.
-fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
+/// A run that is given twice, whole or in part, would be in two sets, or count as two.
+pub(crate) fn refuse_twins(set: &DataSet) -> Result<(), TrainingError> {
     for (k, one) in set.trajectories.iter().enumerate() {
         let before = &set.trajectories[..k];
         if let Some(other) = before.iter().find(|other| other.id() == one.id() || other.sketch.overlaps(&one.sketch)) {
             return Err(TrainingError::Unfit {
                 file: one.name.clone(),
                 what: format!("holds rows of {}: the same run twice", other.name),
-                remedy: "give each stretch of a run once, or it would be in training and test at a time",
+                remedy: "give each stretch of a run once: twice it would be in training and test at a time, and count as two runs",
             });
         }
     }

@@ -14,9 +14,10 @@ use ravenpose_wire::{FEATURES, features};
 use recordings::open::{Opened, open};
 use recordings::stream::Record;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use training::chain::{Chain, Dense};
 use training::commands::{self, Model, Wish};
-use training::data::{self, Reading};
+use training::data::{self, Reading, Trajectory};
 use training::network::Activation;
 use training::{load, onnx};
 
@@ -144,22 +145,24 @@ fn the_service_tells_the_network_the_friction_that_training_appended() {
     );
 }
 
+/// What is kept of a recording, as another.
+fn rewritten(of: &Path, file: PathBuf, keep: &mut dyn FnMut(Record) -> Option<Record>) -> PathBuf {
+    let Opened::States(mut source) = open(of).expect("recording") else { panic!("states") };
+    let mut sink = recordings::save::create_states(&file, recordings::save::StateFormat::Mcap, &[]).expect("file");
+    while let Some(record) = source.next().expect("record") {
+        if let Some(record) = keep(record) {
+            sink.write(&record).expect("written");
+        }
+    }
+    sink.finish().expect("written");
+    file
+}
+
 #[test]
 fn truths_belong_to_the_nearer_state_and_rows_count_from_the_first_of_them() {
     let folder = Folder::new("late-truths");
     let files = runs(&folder, 1, 20.0, ".mcap");
-    let rewritten = |name: &str, keep: &mut dyn FnMut(Record) -> Option<Record>| {
-        let Opened::States(mut source) = open(&files[0]).expect("recording") else { panic!("states") };
-        let file = folder.file(name);
-        let mut sink = recordings::save::create_states(&file, recordings::save::StateFormat::Mcap, &[]).expect("file");
-        while let Some(record) = source.next().expect("record") {
-            if let Some(record) = keep(record) {
-                sink.write(&record).expect("written");
-            }
-        }
-        sink.finish().expect("written");
-        file
-    };
+    let rewritten = |name: &str, keep: &mut dyn FnMut(Record) -> Option<Record>| rewritten(&files[0], folder.file(name), keep);
     let reading = Reading { plays: small("default").plays(), truth_hz: 1000.0, ..Reading::default() };
     let read = |file| data::read(&[file], &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
     // States of 100 Hz, and cameras 7 ms after each, 3 ms before the next.
@@ -185,6 +188,32 @@ fn truths_belong_to_the_nearer_state_and_rows_count_from_the_first_of_them() {
         (Some(of_whole), Some(of_late)) => assert!((of_late - (of_whole - 3.0).max(0.0)).abs() < 0.02, "{of_whole} {of_late}"),
         (of_whole, of_late) => panic!("twenty seconds settle no memory: {of_whole:?} {of_late:?}"),
     }
+}
+
+#[test]
+fn after_a_pause_the_memory_has_to_settle_again() {
+    let folder = Folder::new("pause");
+    let files = runs(&folder, 1, 30.0, ".mcap");
+    let reading = Reading { plays: small("default").plays(), truth_hz: 100.0, ..Reading::default() };
+    let read = |file| data::read(&[file], &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
+    let whole = read(files[0].clone());
+    let settled_s = whole.settled_after_s.expect("settles");
+    assert!(settled_s < 20.0, "{settled_s}");
+    let unsettled = |one: &Trajectory, from_s: f64| {
+        let row = one.time_s.iter().position(|time_s| *time_s >= from_s).expect("row");
+        !one.is_settled(row)
+    };
+    assert!(unsettled(&whole, settled_s - 0.05) && !unsettled(&whole, settled_s + 0.05) && !unsettled(&whole, 25.1));
+    let mut begun_ns = None;
+    let paused = read(rewritten(&files[0], folder.file("paused.mcap"), &mut |record| {
+        let since_ns = record.time_ns() - *begun_ns.get_or_insert(record.time_ns());
+        (!(25_000_000_000..25_060_000_000).contains(&since_ns)).then_some(record)
+    }));
+    assert_eq!(paused.settled_after_s, whole.settled_after_s);
+    assert!(!unsettled(&paused, 24.9) && unsettled(&paused, 25.1));
+    let mut thin = paused.clone();
+    thin.thin(10);
+    assert!(!unsettled(&thin, 24.9) && unsettled(&thin, 25.1));
 }
 
 #[test]

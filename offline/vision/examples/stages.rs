@@ -61,7 +61,7 @@ fn stages(folder: &std::path::Path) -> Result<(), vision::Error> {
         let expected = ledger.expected(frame.t_s);
         match scene.measure(own, expected.as_ref().map(|(pose, near)| (pose, *near))) {
             Ok(measured) => ledger.measured(frame.t_s, &measured.fitted.pose, &measured.views),
-            Err(_) => ledger.lost(),
+            Err(_) => ledger.lost(&[]),
         }
     }
     following.line("rims and pose near the last ones", images.len(), "frame");

@@ -42,7 +42,7 @@ pub fn calibrate(folder: &Path, mode: Mode) -> Result<Calibrated> {
         Mode::Default => jointly(&rig, &firsts, &picks)?,
         Mode::Paper => one_by_one(&rig, &firsts, &picks)?,
     };
-    remark(&rig, &mut calibrated)?;
+    remark(&rig, &firsts, &picks, &mut calibrated)?;
     Ok(calibrated)
 }
 
@@ -81,9 +81,30 @@ fn one_by_one(rig: &Rig, firsts: &[localise::First], picks: &[crate::table::Pick
 
 /// Markers this far off, RMS, are not explained by careless marking.
 const USELESS_PX: f64 = 8.0;
+/// Of a camera's marks, as its reciprocal, from which share on it is not single ones that are wrong.
+const MANY: usize = 4;
+/// No board lies so badly that it puts a camera this far from where it is.
+const FROM_BOARD_M: f64 = 0.1;
 
 /// Says what is odd, and refuses what cannot be used.
-fn remark(rig: &Rig, calibrated: &mut Calibrated) -> Result<()> {
+fn remark(rig: &Rig, firsts: &[localise::First], picks: &[crate::table::Pick], calibrated: &mut Calibrated) -> Result<()> {
+    for (index, (known, first)) in calibrated.cameras.iter().zip(firsts).enumerate() {
+        let (camera, file) = (&known.camera, rig.file.with_file_name("markers.csv"));
+        let marked = picks.iter().filter(|pick| pick.camera == index).count();
+        let left_out = calibrated.contradictions.iter().filter(|odd| odd.camera.as_ref() == Some(&camera.name)).count();
+        if left_out * MANY > marked {
+            let what = format!("{left_out} of its {marked} marks contradict the rest");
+            let remedy = "mark them in images of the size that the rig says, and name the markers as they are";
+            return Err(Error::content(&file, &camera.name, what, remedy));
+        }
+        let off_m = (camera.centre_m - first.camera.centre_m).norm();
+        if first.board.is_some() && off_m > FROM_BOARD_M {
+            let what = format!("the marks place it {:.0} mm from where its chessboard does", off_m * 1e3);
+            let remedy =
+                "check the places of the markers (mm), the size of the images that were marked, and the board's square and place";
+            return Err(Error::content(&file, &camera.name, what, remedy));
+        }
+    }
     let cameras: Vec<crate::Camera> = calibrated.cameras.iter().map(|known| known.camera.clone()).collect();
     if bundle::collinear(&cameras) {
         let what = "all cameras stand on one line: along it balls are placed badly".to_owned();

@@ -69,6 +69,8 @@ pub enum Lost {
     Fixture,
     /// What was measured contradicts itself by more than can be trusted.
     Doubtful,
+    /// Circles that were in doubt would be needed, and have not been consistent for long enough.
+    Waiting,
 }
 
 impl Lost {
@@ -79,6 +81,7 @@ impl Lost {
             Self::Ball(ball) => format!("fewer than two cameras see the {} ball well enough", balls[*ball % 3]),
             Self::Fixture => "the balls found do not stand as the fixture holds them".to_owned(),
             Self::Doubtful => "what was measured contradicts itself".to_owned(),
+            Self::Waiting => "too few circles have been consistent for some frames since they were in doubt".to_owned(),
         }
     }
 }
@@ -118,10 +121,40 @@ pub struct Row {
 pub struct Tracked {
     /// One row per frame.
     pub rows: Vec<Row>,
+    /// Names of the cameras, in the order of the views.
+    pub cameras: Vec<String>,
     /// Colour names in the order of the fixture.
     pub balls: [String; 3],
     /// Exposure by which poses were moved back to the times of their frames, s.
     pub exposure_s: Option<f64>,
     /// When the rows' time is 0, s since 1970, where the recording says so.
     pub start_unix_s: Option<f64>,
+}
+
+/// Of the measured frames of which a camera has an image, as reciprocals, in how many it contradicts the others, or shows no ball where they see
+/// it, if it has moved.
+const CONTRADICTS: usize = 5;
+const SHOWS_NONE: usize = 2;
+/// Fewest such frames.
+const MOVED_MIN: usize = 3;
+
+impl Tracked {
+    /// Cameras that do not fit the others too often: in how many frames, and of how many. None is told in paper mode, which keeps no views.
+    pub fn moved(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+        (0..self.cameras.len()).filter_map(|camera| {
+            let (mut contradicts, mut shows_none, mut seen) = (0, 0, 0);
+            for row in &self.rows {
+                let is = |wanted: fn(&View) -> bool| row.views.iter().any(|own| own.get(camera).is_some_and(wanted));
+                let odd = is(|view| matches!(view, View::Suspended(Suspended::Contradicts)));
+                let none = !odd && !is(|view| matches!(view, View::Effective(_)));
+                let image = is(|view| !matches!(view, View::Suspended(Suspended::NoImage)));
+                contradicts += usize::from(odd);
+                shows_none += usize::from(none && image);
+                seen += usize::from(image);
+            }
+            let odd = contradicts + shows_none;
+            let moved = contradicts * CONTRADICTS > seen || odd * SHOWS_NONE > seen;
+            (odd >= MOVED_MIN && moved).then_some((camera, [odd, seen]))
+        })
+    }
 }

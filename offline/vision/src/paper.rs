@@ -123,10 +123,20 @@ impl PaperTracker {
         let returning = |states: &[[State; 3]], camera: usize| states[camera][ball].suspended.is_some();
         let mut waiting: Vec<(usize, Circle)> = circles.iter().copied().filter(|c| returning(&self.states, c.0)).collect();
         circles.retain(|c| !returning(&self.states, c.0));
+        let off = |point: &Point3<f64>, c: &(usize, Circle)| {
+            scene.cameras[c.0].project(point).map_or(f64::INFINITY, |pixel| (pixel - c.1.centre).norm())
+        };
         let point = loop {
-            let point = mean_of_midpoints(&rays(scene, circles))?;
-            let off =
-                |c: &(usize, Circle)| scene.cameras[c.0].project(&point).map_or(f64::INFINITY, |pixel| (pixel - c.1.centre).norm());
+            let Some(point) = mean_of_midpoints(&rays(scene, circles)) else {
+                // Too few count: those that wait are judged by one another, or they would wait for ever.
+                let all = [circles.as_slice(), &waiting].concat();
+                let point = mean_of_midpoints(&rays(scene, &all))?;
+                if all.iter().all(|c| off(&point, c) < CONTRADICTS_PX) {
+                    self.wait(ball, waiting);
+                }
+                return None;
+            };
+            let off = |c: &(usize, Circle)| off(&point, c);
             let worst = circles.iter().enumerate().max_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
             if off(worst.1) < CONTRADICTS_PX {
                 waiting.retain(|c| off(c) < CONTRADICTS_PX);
@@ -136,6 +146,12 @@ impl PaperTracker {
             self.states[camera][ball].suspended = Some((Suspended::Contradicts, 0));
             circles.remove(index);
         };
+        self.wait(ball, waiting);
+        Some(point)
+    }
+
+    /// One more consistent frame of these.
+    fn wait(&mut self, ball: usize, waiting: Vec<(usize, Circle)>) {
         for (camera, circle) in waiting {
             if let Some((reason, frames)) = self.states[camera][ball].suspended {
                 let frames = frames + 1;
@@ -144,7 +160,6 @@ impl PaperTracker {
                 self.states[camera][ball].frames_since = 0;
             }
         }
-        Some(point)
     }
 
     /// Bounds follow the circles that count and widen for the others.

@@ -93,7 +93,8 @@ pub fn track(
         Mode::Default => timing::to_frame_times(&mut rows, &scene, &rig.timing),
         Mode::Paper => None,
     };
-    Ok(Tracked { rows, balls: fixture.balls.clone(), exposure_s, start_unix_s: recording.start_unix_s })
+    let names = rig.cameras.iter().map(|camera| camera.name.clone()).collect();
+    Ok(Tracked { rows, cameras: names, balls: fixture.balls.clone(), exposure_s, start_unix_s: recording.start_unix_s })
 }
 
 /// Views of a frame; the points of their rims are many and needed of few frames only.
@@ -119,13 +120,15 @@ fn measured(
     t_s: f64,
 ) -> std::result::Result<Measured, Lost> {
     let expected = ledger.expected(t_s);
+    let mut waiting = Vec::new();
     let result = scene.measure(images, expected.as_ref().map(|(pose, near)| (pose, *near))).and_then(|measured| {
-        let waiting = ledger.waiting(&measured.views);
-        if waiting.is_empty() { Ok(measured) } else { scene.without(measured, &waiting) }
+        waiting = ledger.waiting(&measured.views);
+        if waiting.is_empty() { Ok(measured) } else { scene.without(measured, &waiting).map_err(|_| Lost::Waiting) }
     });
     match &result {
         Ok(measured) => ledger.measured(t_s, &measured.fitted.pose, &measured.views),
-        Err(_) => ledger.lost(),
+        // Together they are consistent, and after some frames of that they count.
+        Err(_) => ledger.lost(&waiting),
     }
     result
 }

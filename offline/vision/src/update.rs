@@ -107,11 +107,14 @@ impl Ledger {
         self.near_px = (0.7 * self.near_px).max(NEAR_PX[0]);
     }
 
-    /// Takes a lost frame into account: what was consistent before has to be so again, and bounds widen.
-    pub fn lost(&mut self) {
-        for state in self.states.iter_mut().flatten() {
-            if let State::Suspended(_, frames) = state {
-                *frames = 0;
+    /// Takes a lost frame into account: what was consistent before has to be so again, but for the circles without which it would not have
+    /// been lost, by ball and camera; and bounds widen.
+    pub fn lost(&mut self, waiting: &[(usize, usize)]) {
+        for (ball, states) in self.states.iter_mut().enumerate() {
+            for (camera, state) in states.iter_mut().enumerate() {
+                if let State::Suspended(_, frames) = state {
+                    *frames = if waiting.contains(&(ball, camera)) { *frames + 1 } else { 0 };
+                }
             }
         }
         // Once everything is searched anew, wider bounds say no more; the first frame that is found brings them back.
@@ -128,11 +131,25 @@ mod tests {
         for lost in [4, 30, 2000] {
             let (mut ledger, nothing) = (Ledger::new(0, false), [vec![], vec![], vec![]]);
             ledger.measured(0.0, &Isometry3::identity(), &nothing);
-            (0..lost).for_each(|_| ledger.lost());
+            (0..lost).for_each(|_| ledger.lost(&[]));
             assert!(ledger.expected(60.0).is_none(), "{lost}: everything is searched anew");
             ledger.measured(60.0, &Isometry3::identity(), &nothing);
             let (_, within_px) = ledger.expected(60.03).expect("bounds");
             assert!(within_px <= NEAR_PX[1], "{lost}: {within_px}");
         }
+    }
+
+    #[test]
+    fn circles_without_which_frames_are_lost_come_back_like_others() {
+        let mut ledger = Ledger::new(2, false);
+        ledger.states = std::array::from_fn(|_| vec![State::Suspended(Suspended::NoImage, 0); 2]);
+        let all: Vec<(usize, usize)> = (0..3).flat_map(|ball| [(ball, 0), (ball, 1)]).collect();
+        (1..RETURN_FRAMES).for_each(|_| ledger.lost(&all));
+        assert!(
+            ledger.states.iter().flatten().all(|state| matches!(state, State::Suspended(_, frames) if frames + 1 == RETURN_FRAMES))
+        );
+        // What is missing once begins anew.
+        ledger.lost(&all[..5]);
+        assert_eq!(ledger.states[2][1], State::Suspended(Suspended::NoImage, 0));
     }
 }

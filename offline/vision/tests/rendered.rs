@@ -98,6 +98,80 @@ fn frames_come_back_after_all_images_were_black() {
 }
 
 #[test]
+fn two_cameras_that_come_back_together_are_believed_after_some_frames() {
+    let Some(folder) = data("vision-rendered") else { return };
+    for (mode, gone) in [
+        // In the third frame two cameras have no image, and the other two none from then on: nobody is beyond doubt.
+        (Mode::Default, [(0, 2..3), (1, 2..3), (2, 3..14), (3, 3..14)]),
+        (Mode::Paper, [(0, 2..3), (1, 2..3), (2, 4..5), (3, 4..5)]),
+    ] {
+        let scene = Folder::of_scene(&format!("together-{mode:?}"), &folder.join("easy"), 14);
+        for (camera, frames) in gone {
+            frames.for_each(|frame| drop(std::fs::remove_file(scene.0.join(format!("frames/cam{camera}/{frame:06}.jpg")))));
+        }
+        let tracked = run(&scene.0, mode).expect("a measured recording");
+        let lost: Vec<usize> = (0..14).filter(|frame| tracked.rows[*frame].found.is_err()).collect();
+        println!("{mode:?}: lost {lost:?}");
+        assert!(lost.len() <= 5 && lost.iter().all(|frame| *frame < 10), "{mode:?}: {lost:?}");
+    }
+}
+
+#[test]
+fn a_camera_that_moved_after_it_was_calibrated_is_named() {
+    let Some(folder) = data("vision-rendered") else { return };
+    let scene = Folder::of_scene("moved", &folder.join("easy"), 14);
+    let calibrated = vision::commands::calibrate(&scene.0, Mode::Default).expect("calibrated");
+    for (turned_deg, moved) in [(0.0, vec![]), (0.5, vec![2])] {
+        let mut cameras = calibrated.cameras.clone();
+        let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::y_axis(), f64::to_radians(turned_deg));
+        cameras[2].camera.rotation = turn * cameras[2].camera.rotation;
+        let file = scene.0.join("cameras.toml");
+        let all =
+            vision::commands::Calibrated { cameras, ..vision::commands::calibrate(&scene.0, Mode::Default).expect("calibrated") };
+        vision::commands::write_cameras(&all, &file).expect("written");
+        let tracked = vision::commands::track(&file, &scene.0, Mode::Default, &mut |_, _| ()).expect("a measured recording");
+        assert!(tracked.rows.iter().all(|row| row.found.is_ok()), "three cameras are enough");
+        assert_eq!(tracked.moved().map(|(camera, _)| camera).collect::<Vec<_>>(), moved, "{turned_deg} degrees");
+    }
+}
+
+#[test]
+fn marks_of_another_size_of_image_or_in_another_unit_are_refused() {
+    let Some(folder) = data("vision-rendered") else { return };
+    let scaled = |line: &str, columns: &[usize], by: f64| {
+        let cells: Vec<String> = line
+            .split(',')
+            .enumerate()
+            .map(|(at, cell)| match cell.trim().parse::<f64>() {
+                Ok(number) if columns.contains(&at) => format!("{}", number * by),
+                _ => cell.to_owned(),
+            })
+            .collect();
+        cells.join(",")
+    };
+    for (name, expected) in [("half", "cam1"), ("unit", "from where its chessboard does")] {
+        let scene = Folder::of_scene(name, &folder.join("easy"), 2);
+        scene.edit("markers.csv", |text| {
+            let head: Vec<&str> = text.lines().find(|line| !line.starts_with('#')).expect("head").split(',').collect();
+            let at = |wanted: &str| head.iter().position(|column| column.trim().starts_with(wanted)).expect(wanted);
+            let columns = if name == "half" { vec![at("u"), at("v")] } else { vec![at("x"), at("y"), at("z")] };
+            let lines: Vec<String> = text
+                .lines()
+                .map(|line| match name {
+                    "half" if line.contains("cam1") => scaled(line, &columns, 0.5),
+                    "unit" => scaled(line, &columns, 0.1),
+                    _ => line.to_owned(),
+                })
+                .collect();
+            lines.join("\n") + "\n"
+        });
+        let refused = vision::commands::calibrate(&scene.0, Mode::Default).map(|_| ()).expect_err(name).to_string();
+        println!("{name}: {refused}");
+        assert!(refused.contains(expected) && refused.contains("markers.csv"), "{refused}");
+    }
+}
+
+#[test]
 fn the_same_images_give_the_same_answer() {
     let Some(folder) = data("vision-rendered") else { return };
     let scene = Folder::of_scene("again", &folder.join("hard"), 4);

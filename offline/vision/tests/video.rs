@@ -151,12 +151,13 @@ fn a_video_cut_off_anywhere_ends_with_its_last_whole_image_or_is_refused() {
     assert_eq!(most, 3);
 }
 
-/// A camera that never stops, with its own rate and phase.
+/// A camera with its own rate and phase, which is unplugged at some time.
 struct Fake {
     jpeg: Vec<u8>,
     next_s: f64,
     step_s: f64,
     silent_s: [f64; 2],
+    ends_s: f64,
 }
 
 impl Source for Fake {
@@ -167,11 +168,18 @@ impl Source for Fake {
             self.next_s = self.silent_s[1];
             return self.next();
         }
+        if t_s >= self.ends_s {
+            return Ok(None);
+        }
         Ok(Some(Shot { t_s, taken_ns: None, jpeg: self.jpeg.clone() }))
     }
 
     fn live(&self) -> bool {
         true
+    }
+
+    fn last_words(&mut self) -> Option<String> {
+        Some("it was unplugged".to_owned())
     }
 }
 
@@ -180,7 +188,13 @@ fn live_cameras_of_different_phase_give_common_frames() {
     let Some((scene, rig)) = easy() else { return };
     let jpeg = images(&scene, 0, 1).remove(0);
     let fake = |begun_s: f64, step_s: f64, silent_s: [f64; 2]| -> Option<Box<dyn Source>> {
-        Some(Box::new(Fake { jpeg: jpeg.clone(), next_s: 1000.0 + begun_s, step_s, silent_s: silent_s.map(|s| 1000.0 + s) }))
+        Some(Box::new(Fake {
+            jpeg: jpeg.clone(),
+            next_s: 1000.0 + begun_s,
+            step_s,
+            silent_s: silent_s.map(|s| 1000.0 + s),
+            ends_s: f64::INFINITY,
+        }))
     };
     let sources =
         vec![fake(0.0, 1.0 / 30.0, [9.0, 9.0]), fake(0.21, 1.0 / 15.0, [9.0, 9.0]), fake(0.05, 1.0 / 15.1, [0.5, 1.0]), None];
@@ -194,4 +208,43 @@ fn live_cameras_of_different_phase_give_common_frames() {
     assert!(text.starts_with("# start_unix_s = 1000.210000\nframe,t_s\n0,0.000000\n1,0.066667\n"), "{text}");
     let frames = vision::table::read_frames(&out.join("frames.csv")).expect("times");
     assert_eq!((frames.times.len(), frames.start_unix_s), (30, Some(1000.21)));
+}
+
+#[test]
+fn a_camera_that_is_unplugged_does_not_end_the_recording_of_the_others() {
+    let Some((scene, rig)) = easy() else { return };
+    let jpeg = images(&scene, 0, 1).remove(0);
+    let fake = |ends_s: f64| -> Option<Box<dyn Source>> {
+        Some(Box::new(Fake { jpeg: jpeg.clone(), next_s: 1000.0, step_s: 0.1, silent_s: [0.0; 2], ends_s: 1000.0 + ends_s }))
+    };
+    let own = Folder::new("unplugged");
+    let sources = vec![fake(9.0), fake(1.0), fake(9.0), None];
+    let made = record(&rig, sources, 10.0, Some(3.0), &own.0.join("scene"), &mut |_, _| {}).expect("recorded");
+    assert_eq!((made.frames, &made.images[..]), (30, &[30, 10, 30, 0][..]));
+    let [(camera, after_s, said)] = &made.ended[..] else { panic!("{:?}", made.ended) };
+    assert!(*camera == 1 && (after_s - 0.9).abs() < 0.01 && said.as_deref() == Some("it was unplugged"), "{:?}", made.ended);
+}
+
+#[test]
+fn a_damaged_image_costs_its_camera_that_frame_and_a_short_video_is_told() {
+    let Some((scene, rig)) = easy() else { return };
+    let own = Folder::new("damaged");
+    let made = |name: &str, frames_of_last: usize| {
+        let sources = (0..4).map(|camera| {
+            let mut all = images(&scene, camera, if camera == 3 { frames_of_last } else { 14 });
+            if camera == 2 {
+                all[2].truncate(150);
+            }
+            let file = own.0.join(format!("{name}{camera}.avi"));
+            std::fs::write(&file, avi(&all, 5, *b"MJPG")).expect("file");
+            Some(opened(&file).expect("a video"))
+        });
+        record(&rig, sources.collect(), 5.0, None, &own.0.join(name), &mut |_, _| {}).expect("recorded")
+    };
+    let whole = made("whole", 14);
+    assert_eq!((whole.frames, &whole.images[..], &whole.damaged[..]), (14, &[14, 14, 13, 14][..], &[0, 0, 1, 0][..]));
+    assert!(whole.ended.is_empty() && !own.0.join("whole/frames/cam2/000002.jpg").exists(), "{:?}", whole.ended);
+    let short = made("short", 4);
+    assert_eq!(short.frames, 4);
+    assert!(matches!(&short.ended[..], [(3, after_s, None)] if (after_s - 0.6).abs() < 0.01), "{:?}", short.ended);
 }

@@ -61,7 +61,8 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
     let offsets = workers::all(&files, files.len(), total, wish.threads, |index, watch| {
         reaches(model, runs[index], &files[index], plan.seed, watch)
     })?;
-    let mut text = format!("robot = {}\nseed = {}\nruns = {}\n", model.name(), plan.seed, runs.len());
+    let homing = plan.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"));
+    let mut text = format!("robot = {}\nseed = {}\n{homing}runs = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offset) in runs.iter().zip(&files).zip(offsets) {
         let offset = &offset[..model.joint_count()];
         let _ = writeln!(
@@ -81,9 +82,14 @@ fn reaches(model: &RobotModel, run: Run, file: &Path, seed: u64, watch: &Watch) 
     let motion = trajectory(model, run.seed, run.duration_s);
     let mut simulation = ArmSimulation::new(model, None, run.homing_seed, motion.start()).map_err(|error| error.to_string())?;
     simulation.settle(motion.start(), SETTLE_S);
-    let (seed, number) = (seed.to_string(), (run.index + 1).to_string());
+    let [seed, homing, number] = [seed, run.homing_seed, run.index as u64 + 1].map(|number| number.to_string());
     let period_s = simulation.period_s();
-    let mut table = Table::create(file, model, period_s, &[("seed", &seed), ("run", &number), ("motion", "teleoperation")])?;
+    let mut table = Table::create(
+        file,
+        model,
+        period_s,
+        &[("seed", &seed), ("homing_seed", &homing), ("run", &number), ("motion", "teleoperation")],
+    )?;
     for cycle in 0..(run.duration_s / period_s).round() as u64 {
         watch.cycle()?;
         let time_s = (cycle as f64 * period_s * 1e9).round() / 1e9;
@@ -107,8 +113,8 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
         follow(model, &runs[index], &files[index], seed(index), watch)
     })?;
     let mut text = format!("robot = {}\nruns = {}\n", model.name(), runs.len());
-    for (run, file) in runs.iter().zip(&files) {
-        let _ = writeln!(text, "{}: commands of {}", name(file), run.name);
+    for (index, (run, file)) in runs.iter().zip(&files).enumerate() {
+        let _ = writeln!(text, "{}: homing seed {}, commands of {}", name(file), seed(index), run.name);
     }
     finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)?;
     Ok(status)
@@ -118,7 +124,9 @@ fn follow(model: &RobotModel, run: &resimulate::Run, file: &Path, seed: u64, wat
     let settle_s = if run.motors.is_some() { 0.0 } else { SETTLE_S };
     let options = ClosedLoop { seed, settle_s, ..ClosedLoop::default() };
     let found = closed_loop(model, run, options).map_err(|error| format!("{}: {error}", run.name))?;
-    let mut table = Table::create(file, model, run.period_s(), &[("motion", "commands of a recording")])?;
+    let homing = seed.to_string();
+    let metadata = [("homing_seed", homing.as_str()), ("motion", "commands of a recording")];
+    let mut table = Table::create(file, model, run.period_s(), &metadata)?;
     for row in 0..found.len() {
         watch.cycle()?;
         table.row(found.time_s[row], &found.row(row))?;

@@ -68,7 +68,7 @@ fn runs_away(robot: &str) -> String {
 
 /// Writes the summary and says in one line what was made.
 fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<(), String> {
-    crate::output::whole(summary, |file| file.write_all(text.as_bytes()).map_err(|error| error.to_string()))?;
+    crate::output::all(summary, text.as_bytes())?;
     let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
     say!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
     Ok(())

@@ -60,7 +60,8 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
             let mut player = begun.map_err(|error| error.to_string())?;
             offsets.push(plan.sides.iter().filter_map(|side| player.homing_offset(*side).copied()).collect());
             let (seed, number) = (plan.seed.to_string(), (run.index + 1).to_string());
-            let metadata = [("seed", seed.as_str()), ("run", &number), ("motion", motion_of(*run))];
+            let homing = run.homing_seed.to_string();
+            let metadata = [("seed", seed.as_str()), ("homing_seed", &homing), ("run", &number), ("motion", motion_of(*run))];
             write(&mut player, model.name(), &metadata, &files[run.index], watch)?;
             last = Some(player);
         }
@@ -110,12 +111,15 @@ fn followed(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCod
     let total = runs.iter().map(Run::cycles).sum();
     workers::all(&files, files.len(), total, wish.threads, |index, watch| {
         let mut player = Player::following(model, &recorded[index], runs[index]).map_err(|error| error.to_string())?;
-        let number = (index + 1).to_string();
-        write(&mut player, model.name(), &[("run", &number), ("motion", "commands of a recording")], &files[index], watch)
+        let [seed, homing, number] = [runs[index].seed, runs[index].homing_seed, index as u64 + 1].map(|number| number.to_string());
+        let metadata = [("seed", seed.as_str()), ("homing_seed", &homing), ("run", &number), ("motion", "commands of a recording")];
+        write(&mut player, model.name(), &metadata, &files[index], watch)
     })?;
-    let mut text = format!("robot = {}\nruns = {}\n", model.name(), runs.len());
+    let seed = wish.seed.unwrap_or_default();
+    let mut text = format!("robot = {}\narm = {}\nseed = {seed}\nruns = {}\n", model.name(), wish.arm, runs.len());
     for ((run, file), recorded) in runs.iter().zip(&files).zip(&recorded) {
-        let _ = writeln!(text, "{}: {:.3} s, commands of {}", name(file), run.duration_s, recorded.name);
+        let (duration_s, homing) = (run.duration_s, run.homing_seed);
+        let _ = writeln!(text, "{}: {duration_s:.3} s, homing seed {homing}, commands of {}", name(file), recorded.name);
     }
     finish(wish, model, &format!("{} runs", runs.len()), &summary, &text)?;
     Ok(status)
@@ -131,7 +135,8 @@ fn write(player: &mut Player, robot: &str, more: &[(&str, &str)], file: &Path, w
         .collect();
     // A tidy table is made of the states by the same code that converts recordings: through a file beside it.
     let table = if StateFormat::of_name(file).is_none() { TableFormat::of_name(file) } else { None };
-    let states_file = if table.is_some() { file.with_extension("states.mcap") } else { file.to_owned() };
+    let aside = || file.with_file_name(format!(".{}.{}.states.mcap", name(file), std::process::id()));
+    let states_file = if table.is_some() { aside() } else { file.to_owned() };
     let format = StateFormat::of_name(&states_file).ok_or_else(|| format!("{}: no format has this ending", file.display()))?;
     let mut sink = save::create_states(&states_file, format, &metadata).map_err(|error| error.to_string())?;
     player.records(|record| {

@@ -154,10 +154,7 @@ fn metadata(side: Side, with_force: bool) -> Vec<(String, String)> {
         ("dt".to_owned(), columns::DT_NOTE.to_owned()),
         ("sequence".to_owned(), columns::COUNTERS_NOTE.to_owned()),
         ("truth".to_owned(), format!("columns 0-3, external encoders of joints 1 to 3, taken for the {} arm", side.name())),
-        (
-            "left_out".to_owned(),
-            format!("columns 4-11 (CRTK joints){force} are neither state nor truth; read the file as a table to keep them"),
-        ),
+        ("left_out".to_owned(), format!("columns 4-11 (CRTK joints){force} are neither state nor truth and are left out")),
     ]
 }
 

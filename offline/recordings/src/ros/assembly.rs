@@ -17,6 +17,8 @@ const EXTERNAL_JOINTS: &str = "/ext_jpos";
 /// Joints that those measure.
 const EXTERNAL_COUNT: usize = 3;
 
+/// Measured joints that wait for the first state at most: half a minute at 1 kHz.
+const EARLY_MAX: usize = 30_000;
 /// What a pair takes up beside its text.
 const PAIR_BYTES: usize = 2 * size_of::<String>();
 
@@ -105,6 +107,8 @@ pub(crate) struct Assembler {
     first_ns: Option<i64>,
     /// Arms of the last state.
     arms: u32,
+    /// Joints measured before the first state, which says whose they are.
+    early: VecDeque<Truth>,
     metadata: Vec<(String, String)>,
     metadata_bytes: usize,
     /// Topic of the images that are wanted, and those that are ready, with their times in ns.
@@ -145,6 +149,11 @@ impl Assembler {
 
     /// Nothing follows: what waits is complete.
     pub(crate) fn end(&mut self) {
+        self.complete_pose();
+        self.give_early();
+    }
+
+    fn complete_pose(&mut self) {
         if let Some((truth, _)) = self.pose.take() {
             self.ready.push_back(Record::Truth(truth));
         }
@@ -160,7 +169,7 @@ impl Assembler {
             }
             Role::Pose(side) => {
                 let pose = PoseStamped::decode(bytes)?;
-                self.end();
+                self.complete_pose();
                 let known = Truth::unknown(stamp(pose.header, time_ns), *side);
                 let truth = Truth { position_m: pose.position_m, quaternion_wxyz: pose.quaternion_wxyz, ..known };
                 self.pose = Some((truth, pose.header.seq));
@@ -197,7 +206,8 @@ impl Assembler {
             state.source_time_ns = stamp_ns - *self.first_ns.get_or_insert(stamp_ns);
         }
         self.arms = state.connected();
-        self.end();
+        self.complete_pose();
+        self.give_early();
         self.ready.push_back(Record::State(Box::new(state)));
         Ok(())
     }
@@ -209,7 +219,7 @@ impl Assembler {
             Some((truth, seq)) if truth.side == side && truth.time_ns == time_ns && seq == message.header.seq => truth,
             other => {
                 self.pose = other;
-                self.end();
+                self.complete_pose();
                 Truth::unknown(time_ns, side)
             }
         };
@@ -222,13 +232,26 @@ impl Assembler {
     /// The message does not say which arm: it is the connected one, or gold where both are.
     fn take_external(&mut self, time_ns: u64, bytes: &[u8]) -> Result<(), MessageError> {
         let message = JointState::decode(bytes)?;
-        let side = if self.arms == 2 { Side::Green } else { Side::Gold };
-        let mut truth = Truth::unknown(stamp(message.header, time_ns), side);
+        let mut truth = Truth::unknown(stamp(message.header, time_ns), self.connected_side());
         let measured = message.position.len().min(EXTERNAL_COUNT);
         copy("position", &message.position[..measured], &mut truth.joints)?;
-        self.end();
-        self.ready.push_back(Record::Truth(truth));
+        self.complete_pose();
+        if self.states == 0 && self.early.len() < EARLY_MAX {
+            self.early.push_back(truth);
+        } else {
+            self.give_early();
+            self.ready.push_back(Record::Truth(truth));
+        }
         Ok(())
+    }
+
+    fn connected_side(&self) -> Side {
+        if self.arms == 2 { Side::Green } else { Side::Gold }
+    }
+
+    fn give_early(&mut self) {
+        let side = self.connected_side();
+        self.ready.extend(self.early.drain(..).map(|truth| Record::Truth(Truth { side, ..truth })));
     }
 }
 

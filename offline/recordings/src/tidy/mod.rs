@@ -68,7 +68,7 @@ pub fn open_part(
     };
     match open::open(path)? {
         Opened::Table(table) => Ok(table),
-        Opened::States(source) => Ok(Box::new(StateTable::showing(part(source), &shown, options)?)),
+        Opened::States(source) => Ok(Box::new(StateTable::showing(part(source), &shown, options))),
     }
 }
 

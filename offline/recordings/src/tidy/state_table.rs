@@ -8,7 +8,7 @@ use super::Options;
 use super::align::{Align, Row};
 use super::columns::ArmColumns;
 use super::shown::Shown;
-use crate::stream::{Damage, Record, Source, StreamError};
+use crate::stream::{Channel, Damage, Record, Source, StreamError};
 use crate::table::{BATCH_ROWS, Batch, ColumnCells, TableColumn, TableSource};
 
 /// Records that are looked at to decide which columns there are, where the rest is not known yet.
@@ -50,26 +50,15 @@ impl StateTable {
     }
 
     /// With columns for what the source is known to hold.
-    ///
-    /// # Errors
-    /// [`StreamError`] of the source.
-    pub fn showing(mut source: Box<dyn Source>, shown: &Shown, options: Options) -> Result<Self, StreamError> {
-        let mut peeked = VecDeque::new();
-        while !matches!(peeked.back(), Some(Record::State(_))) && peeked.len() < PEEK {
-            match source.next()? {
-                Some(record) => peeked.push_back(record),
-                None => break,
-            }
-        }
-        Ok(Self::begun(source, peeked, shown, options))
+    pub fn showing(source: Box<dyn Source>, shown: &Shown, options: Options) -> Self {
+        Self::begun(source, VecDeque::new(), shown, options)
     }
 
     fn begun(source: Box<dyn Source>, peeked: VecDeque<Record>, shown: &Shown, options: Options) -> Self {
         let sides = options.arms.map_or_else(|| shown.arms(), |arms| arms.sides().to_vec());
         let of = |side: &Side| shown.truth(*side, options.all_truth);
         let arms: Vec<ArmColumns> = sides.iter().map(|side| ArmColumns::new(*side, of(side), options.orientation)).collect();
-        let peeked_ns = || peeked.iter().find(|record| matches!(record, Record::State(_))).map(Record::time_ns);
-        let start_ns = shown.first_state_ns.or_else(peeked_ns);
+        let start_ns = shown.first_state_ns;
         let mut columns = vec![TableColumn::number("t_s")];
         for arm in &arms {
             let prefix = if arms.len() > 1 { format!("{}_", arm.arm.side.name()) } else { String::new() };
@@ -160,6 +149,10 @@ impl TableSource for StateTable {
             ));
         }
         findings
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        self.source.channels()
     }
 }
 

@@ -24,11 +24,12 @@ impl Commands {
         let mut rows = commands.clone();
         if let Some(robot) = model.as_raven() {
             let n = model.joint_count();
+            // A log of states has the columns of a tool that was not commanded, too.
             let has_tool = commands.iter().any(|row| row[n..].iter().any(|value| *value != 0.0));
-            if !has_tool {
-                let home = &robot.raven.plant().limits.home;
+            let home = &robot.raven.plant().limits.home;
+            for joint in (n..home.len()).filter(|joint| !has_tool || run.uncommanded[*joint]) {
                 for row in &mut rows {
-                    row[n..home.len()].copy_from_slice(&home[n..]);
+                    row[joint] = home[joint];
                 }
             }
         }

@@ -23,6 +23,8 @@ pub struct Run {
     pub time_s: Vec<f64>,
     /// Commanded joints, rad and m.
     pub joints_d: Option<Rows>,
+    /// Joints that have no column of commands, beside some that have.
+    pub uncommanded: [bool; JOINTS_MAX],
     /// Motor angles as encoders show them, rad.
     pub motors: Option<Rows>,
     /// Motor speeds, rad/s.
@@ -55,6 +57,7 @@ impl Run {
         let columns = Columns { recording, model };
         let mut run = Self { name: recording.name.clone(), time_s, ..Self::default() };
         run.joints_d = columns.joints("jpos_d");
+        run.uncommanded = std::array::from_fn(|joint| !columns.has("jpos_d", joint));
         run.joints = columns.joints("jpos");
         run.true_joints = columns.joints("truth_jpos");
         run.motors = columns.motors("mpos", "rad").or_else(|| Some(columns.motors_of_joints(run.joints.as_ref()?)));
@@ -106,6 +109,7 @@ impl Run {
             name: self.name.clone(),
             time_s: self.time_s[rows.clone()].to_vec(),
             joints_d: cut(&self.joints_d),
+            uncommanded: self.uncommanded,
             motors: cut(&self.motors),
             speeds: cut(&self.speeds),
             torque: cut(&self.torque),
@@ -161,8 +165,16 @@ struct Columns<'a> {
 impl Columns<'_> {
     /// A joint's column for every joint that has dynamics, and for those further ones that the recording has.
     fn joints(&self, quantity: &str) -> Option<Rows> {
-        let kinds = self.model.joint_kinds();
-        self.rows(|joint| kinds.get(joint).map(|kind| format!("{quantity}_{}_{}", joint + 1, kind.position_unit())))
+        self.rows(|joint| self.name_of(quantity, joint))
+    }
+
+    fn has(&self, quantity: &str, joint: usize) -> bool {
+        self.name_of(quantity, joint).is_some_and(|name| self.recording.column(&name).is_some())
+    }
+
+    fn name_of(&self, quantity: &str, joint: usize) -> Option<String> {
+        let kind = self.model.joint_kinds().get(joint).copied()?;
+        Some(format!("{quantity}_{}_{}", joint + 1, kind.position_unit()))
     }
 
     fn motors(&self, quantity: &str, unit: &str) -> Option<Rows> {

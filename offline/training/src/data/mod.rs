@@ -46,19 +46,22 @@ pub struct Trajectory {
     pub board: i32,
     /// Of all states, or all rows of a table with truth, read at whatever rate.
     pub sketch: Sketch,
-    /// How long the run's own memory took to settle, s from its first state; none if it never did, or there is none.
+    /// Per row: had the run's own memory yet to settle? Empty where there is none. A pause begins it anew.
+    pub is_unsettled: Vec<bool>,
+    /// How long the run's own memory first took to settle, s from its first state; none if it never did, or there is none.
     pub settled_after_s: Option<f64>,
 }
 
 impl Trajectory {
     /// What this run is, whatever its rate: a hash of its first row without memory and noise. A RAVEN-II's state is like no other;
-    /// the few columns of a table may begin alike, so there the file's name counts too.
+    /// the few columns of a table may begin alike, under the same name too, so there its sketch counts as well.
     pub fn id(&self) -> String {
         let width = self.inputs.len() / self.rows().max(1);
         let outputs = self.exact.len() / self.rows().max(1);
         let mut hash = Sha256::new();
         if width < FEATURES {
             hash.update(&self.name);
+            hash.update(self.sketch.word());
         }
         for number in self.inputs.iter().take(width.min(FEATURES)).chain(self.exact.iter().take(outputs)) {
             hash.update(number.to_le_bytes());
@@ -81,7 +84,7 @@ impl Trajectory {
 
     /// Had the run's own memory settled by a row? True where there is none.
     pub fn is_settled(&self, row: usize) -> bool {
-        self.young_places.is_empty() || self.settled_after_s.is_some_and(|after_s| self.time_s[row] >= after_s)
+        self.is_unsettled.get(row).is_none_or(|unsettled| !unsettled)
     }
 
     /// The rows in which a memory of such an age had not settled, as it had them then; no rows where there is no memory.
@@ -121,6 +124,9 @@ impl Trajectory {
         }
         if !self.unsettled_s.is_empty() {
             self.unsettled_s = kept().map(|row| self.unsettled_s[row]).collect();
+        }
+        if !self.is_unsettled.is_empty() {
+            self.is_unsettled = kept().map(|row| self.is_unsettled[row]).collect();
         }
     }
 

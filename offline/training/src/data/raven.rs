@@ -200,6 +200,9 @@ impl<'a> Pairing<'a> {
         self.young.places(&inputs, &mut places);
         self.found.young_places.extend_from_slice(&places);
         let age_s = self.state_ns.saturating_sub(self.young_since_ns) as f64 * 1e-9;
+        if !self.memory.is_empty() {
+            self.found.is_unsettled.push(!self.memory.is_settled());
+        }
         self.found.unsettled_s.push(if self.young.is_settled() { f64::NAN } else { age_s });
         self.found.labels.extend(label.map(|part| part as f32));
         Ok(())

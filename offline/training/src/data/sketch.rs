@@ -3,7 +3,7 @@
 //! the same part.
 
 use crate::random::{GOLDEN, mixed};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Hashes kept of each run.
 const KEPT: usize = 64;
@@ -15,10 +15,50 @@ const LEAST: usize = 2;
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sketch(BTreeSet<u64>);
 
+/// Rows of a table that are hashed together: one row of a few coarse columns may be in any run, so many in this order are not.
+const WINDOW: usize = 32;
+
+/// The sketch of a table's rows, one window after the other, each beginning a row later.
+#[derive(Debug, Default)]
+pub(super) struct Windows {
+    sketch: Sketch,
+    rows: VecDeque<u64>,
+}
+
+impl Windows {
+    /// Adds a row. One like the last is passed over: where nothing changes there is nothing to know a run by.
+    pub(super) fn add(&mut self, row: impl IntoIterator<Item = f32>) {
+        let row = hashed(row.into_iter().map(|number| u64::from(number.to_bits())));
+        if self.rows.back() == Some(&row) {
+            return;
+        }
+        self.rows.push_back(row);
+        if self.rows.len() == WINDOW {
+            self.sketch.insert(hashed(self.rows.iter().copied()));
+            self.rows.pop_front();
+        }
+    }
+
+    /// All that was added; of less than a window its rows as they are.
+    pub(super) fn finish(mut self) -> Sketch {
+        if self.sketch.0.is_empty() {
+            self.sketch.insert(hashed(self.rows.iter().copied()));
+        }
+        self.sketch
+    }
+}
+
+fn hashed(numbers: impl IntoIterator<Item = u64>) -> u64 {
+    numbers.into_iter().fold(0, |hash, number| mixed(hash ^ number).wrapping_add(GOLDEN))
+}
+
 impl Sketch {
-    /// Adds a row, every number as it was read.
+    /// Adds a row that is like no other, every number as it was read.
     pub fn add(&mut self, row: impl IntoIterator<Item = f32>) {
-        let hash = row.into_iter().fold(0, |hash, number| mixed(hash ^ u64::from(number.to_bits())).wrapping_add(GOLDEN));
+        self.insert(hashed(row.into_iter().map(|number| u64::from(number.to_bits()))));
+    }
+
+    fn insert(&mut self, hash: u64) {
         if self.0.len() < KEPT || self.0.last().is_some_and(|last| hash < *last) {
             self.0.insert(hash);
             if self.0.len() > KEPT {
@@ -65,5 +105,22 @@ mod tests {
         let mut standing = Sketch::default();
         (0..1000).for_each(|_| standing.add([1.0, 2.0]));
         assert!(!standing.overlaps(&standing.clone()));
+    }
+
+    #[test]
+    fn coarse_tables_of_other_runs_are_other_runs_and_parts_of_one_are_not() {
+        // Degrees to a tenth: of two sweeps that are out of step nearly every row is in both.
+        let of = |rows: std::ops::Range<i32>, rate: f32| {
+            let mut windows = Windows::default();
+            rows.for_each(|row| windows.add([((row as f32 * rate).sin() * 20.0).round() / 10.0, 0.0]));
+            windows.finish()
+        };
+        let whole = of(0..5000, 0.01);
+        assert!(of(3000..5000, 0.01).overlaps(&whole));
+        assert!(!of(0..5000, 0.0123).overlaps(&whole));
+        // Both stand for long where they begin.
+        assert!(!of(0..5000, 0.0).overlaps(&of(0..5000, 0.0)));
+        let few = of(0..20, 0.01);
+        assert!(few == of(0..20, 0.01) && few != of(0..20, 0.02));
     }
 }

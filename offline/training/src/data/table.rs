@@ -1,5 +1,6 @@
 //! Any tidy CSV (or Parquet) table with named inputs and truth.
 
+use super::sketch::Windows;
 use super::{DataSet, Trajectory};
 use crate::error::{TrainingError, shown};
 use recordings::csv::{self, CsvProblem};
@@ -51,6 +52,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
     let mut found = Trajectory { name, ..Trajectory::default() };
     let (mut next_s, mut before_s) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     let mut left_out = 0;
+    let mut sketch = Windows::default();
     let mut memories = Memories { widths: &columns.plays, held: Vec::new() };
     for row in 0..recording.rows() {
         let time_s = recording.time_s().map_or(row as f64, |time| time[row]);
@@ -81,7 +83,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
         let labels: Vec<f32> = (0..truth.len())
             .map(|output| (truth[output][row] - reported.get(output).map_or(0.0, |column| column[row])) as f32)
             .collect();
-        found.sketch.add(values.iter().map(|value| *value as f32).chain(labels.iter().copied()));
+        sketch.add(values.iter().map(|value| *value as f32).chain(labels.iter().copied()));
         if recording.time_s().is_some() && time_s < next_s {
             continue;
         }
@@ -104,6 +106,7 @@ pub(super) fn read(file: &Path, columns: &Columns, truth_hz: f64, notes: &mut Ve
         });
     }
     found.exact.clone_from(&found.labels);
+    found.sketch = sketch.finish();
     Ok(found)
 }
 

@@ -5,7 +5,7 @@ mod domain;
 mod metrics;
 mod page;
 
-use crate::commands::{Model, truth_noise_key, write_whole};
+use crate::commands::{Model, refuse_twins, truth_noise_key, write_whole};
 use crate::data::{self, Reading, Sketch, Trajectory};
 use crate::error::{TrainingError, shown};
 use crate::{load, rivals};
@@ -284,6 +284,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         ..wish.reading.clone()
     };
     let mut set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
+    refuse_twins(&set)?;
     // As the service reads it.
     let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
     let card = set.is_raven.then(|| Card::read(&model.card, target)).transpose().map_err(refused)?;

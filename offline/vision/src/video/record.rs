@@ -7,21 +7,29 @@ use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex};
 
 /// Images that may wait between a camera and the disk; more are waited for, or lost by the camera itself.
 const WAITING: usize = 64;
 
 /// What was recorded.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     /// Frames.
     pub frames: usize,
     /// Images per camera, in the order of the rig.
     pub images: Vec<usize>,
+    /// Images per camera that could not be decoded and are left out.
+    pub damaged: Vec<usize>,
+    /// Cameras that ended before another, by their place in the rig: when, s after the first frame, and what they said.
+    pub ended: Vec<(usize, f64, Option<String>)>,
 }
 
+/// A source that goes on for so long after another has ended, s, is no longer of one length with it.
+const LONGER_S: f64 = 1.0;
+
 /// Writes `rig.toml`, `frames.csv` and `frames/NAME/` of a new scene folder from a source per camera of the rig (`None`: no images
-/// of this camera). It ends with the first source that does, or after `seconds`. `progress` is told frames done and in all, 0 if
+/// of this camera). It ends with the first video that does, with the last of webcams and of recordings, or after `seconds`. `progress` is told frames done and in all, 0 if
 /// nobody knows.
 ///
 /// # Errors
@@ -62,8 +70,8 @@ fn all(
     out: &Path,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<Recorded> {
-    // Of a recording, a camera may have failed long before the others; videos that somebody chose end together.
-    let until_last = sources.iter().flatten().all(|source| source.since_1970() && !source.live());
+    // Of a recording, or while it is made, a camera may fail long before the others; videos that somebody chose end together.
+    let until_last = sources.iter().flatten().all(|source| source.since_1970());
     let since_1970 = sources.iter().flatten().any(|source| source.since_1970());
     let mut tracks: Vec<Option<Track>> = sources.into_iter().map(|source| source.map(Track::start)).collect();
     for (camera, _) in rig.cameras.iter().zip(&tracks).filter(|(_, track)| track.is_some()) {
@@ -82,7 +90,7 @@ fn all(
         let _ = writeln!(list, "# start_unix_s = {from_s:.6}");
     }
     list.push_str("frame,t_s\n");
-    let mut images = vec![0; tracks.len()];
+    let (mut images, mut damaged) = (vec![0; tracks.len()], vec![0; tracks.len()]);
     let mut frames = 0;
     while most == 0 || frames < most {
         let t_s = from_s + frames as f64 * step_s;
@@ -94,7 +102,14 @@ fn all(
             let Some(shot) = shot else { continue };
             let name = &rig.cameras[index].name;
             let file = out.join("frames").join(name).join(format!("{frames:06}.jpg"));
-            sized(&shot.jpeg, rig, name)?;
+            // A camera that fell out while it wrote must not cost the other images.
+            if let Err(error) = sized(&shot.jpeg, rig, name) {
+                if error.is_size || images[index] == 0 {
+                    return Err(error.error);
+                }
+                damaged[index] += 1;
+                continue;
+            }
             std::fs::write(&file, &shot.jpeg).map_err(Error::write(&file))?;
             images[index] += 1;
         }
@@ -113,26 +128,56 @@ fn all(
         let file = out.join("frames").join(&camera.name).join(format!("{frames:06}.jpg"));
         images[index] -= usize::from(std::fs::remove_file(file).is_ok());
     }
+    let ended = ended(&mut tracks, from_s, from_s + frames as f64 * step_s)?;
     let rig_file = out.join("rig.toml");
     std::fs::copy(&rig.file, &rig_file).map_err(Error::write(&rig_file))?;
     let times = out.join("frames.csv");
     std::fs::write(&times, list).map_err(Error::write(&times))?;
-    Ok(Recorded { frames, images })
+    Ok(Recorded { frames, images, damaged, ended })
+}
+
+/// Which cameras ended before another that went on for longer, and what they said.
+fn ended(tracks: &mut [Option<Track>], from_s: f64, until_s: f64) -> Result<Vec<(usize, f64, Option<String>)>> {
+    let mut last_s = Vec::new();
+    for (index, track) in tracks.iter_mut().enumerate() {
+        let Some(track) = track else { continue };
+        while !track.live && track.last_s < until_s + LONGER_S && track.fetch()?.is_some() {
+            track.take();
+        }
+        last_s.push((index, track.last_s));
+    }
+    let longest_s = last_s.iter().map(|(_, last_s)| *last_s).fold(f64::NEG_INFINITY, f64::max);
+    let early = last_s
+        .into_iter()
+        .filter(|(index, last_s)| last_s + LONGER_S <= longest_s && tracks[*index].as_ref().is_some_and(|track| track.over));
+    Ok(early
+        .map(|(index, last_s)| {
+            let said = tracks[index].as_ref().and_then(|track| track.said.lock().ok()?.clone());
+            (index, last_s - from_s, said)
+        })
+        .collect())
+}
+
+/// What is wrong with an image, and whether it is its size.
+struct Unfit {
+    is_size: bool,
+    error: Error,
 }
 
 /// An image of another size makes all that follows wrong.
-fn sized(jpeg: &[u8], rig: &Rig, camera: &str) -> Result<()> {
+fn sized(jpeg: &[u8], rig: &Rig, camera: &str) -> std::result::Result<(), Unfit> {
+    let unfit = |is_size, what, remedy: String| Err(Unfit { is_size, error: Error::content(&rig.file, camera, what, remedy) });
     let reader = image::ImageReader::with_format(Cursor::new(jpeg), image::ImageFormat::Jpeg);
     let [w, h] = rig.size_px;
     match reader.into_dimensions() {
         Ok(size) if size == (w, h) => Ok(()),
         Ok((a, b)) => {
             let what = format!("its video has {a} x {b} px");
-            Err(Error::content(&rig.file, camera, what, format!("the rig says {w} x {h}: record in the size that was calibrated")))
+            unfit(true, what, format!("the rig says {w} x {h}: record in the size that was calibrated"))
         }
         Err(error) => {
             let what = format!("an image of its video is no JPEG: {error}").replace('\n', " ");
-            Err(Error::content(&rig.file, camera, what, "record it anew"))
+            unfit(false, what, "record it anew".to_owned())
         }
     }
 }
@@ -143,21 +188,32 @@ struct Track {
     held: Option<Shot>,
     ahead: Option<Shot>,
     over: bool,
+    live: bool,
+    /// When its last image was taken, of those that were looked at.
+    last_s: f64,
+    /// What it said at its end.
+    said: Arc<Mutex<Option<String>>>,
 }
 
 impl Track {
     fn start(mut source: Box<dyn Source>) -> Self {
         let (sender, shots) = sync_channel(WAITING);
+        let live = source.live();
+        let said = Arc::new(Mutex::new(None));
+        let words = Arc::clone(&said);
         std::thread::spawn(move || {
             while let Some(shot) = source.next().transpose() {
                 let fault = shot.is_err();
                 // Nobody listens any more: the recording is over.
                 if sender.send(shot).is_err() || fault {
-                    break;
+                    return;
                 }
             }
+            if let Ok(mut words) = words.lock() {
+                *words = source.last_words();
+            }
         });
-        Self { shots, held: None, ahead: None, over: false }
+        Self { shots, held: None, ahead: None, over: false, live, last_s: f64::NEG_INFINITY, said }
     }
 
     /// When the next image was taken; it is fetched and not taken.
@@ -169,6 +225,13 @@ impl Track {
         Ok(self.ahead.as_ref().map(|shot| shot.t_s))
     }
 
+    /// Takes the image that was fetched.
+    fn take(&mut self) -> Option<Shot> {
+        let shot = self.ahead.take()?;
+        self.last_s = shot.t_s;
+        Some(shot)
+    }
+
     /// The image nearest to a time, if it is within a tolerance and was not the nearest before; and whether the source has ended
     /// before that time.
     fn nearest(&mut self, t_s: f64, tolerance_s: f64) -> Result<(Option<Shot>, bool)> {
@@ -177,7 +240,7 @@ impl Track {
             if !nearer {
                 break;
             }
-            self.held = self.ahead.take();
+            self.held = self.take();
         }
         let shot = self.held.take_if(|held| (held.t_s - t_s).abs() <= tolerance_s);
         let ended = self.over && shot.is_none() && self.held.as_ref().is_none_or(|held| held.t_s < t_s);
