@@ -20,12 +20,13 @@ compare by ratio, within one table. `make bench-ci` is the short part; `RAVENPOS
 - *once a millisecond* is what a robot sees: between two runs the core sleeps, and whatever else runs pushes the weights out of the cache.
 - *ORT*: ONNX Runtime by its C interface, one thread, input and output bound once; from its Python package, which `make venv` installs.
 - *avx512vnni*, *avx2+fma*, *portable*: whole-number sums for i16, i12 and i8, float32 otherwise ([decision 0013](decisions/0013-small-weights.md)).
-- *kept warm* is how the service runs it: while it waits for a state it reads its weights, here for 0.2 ms before.
+- *kept warm* is how the service runs it: while it waits for a state it reads its weights, here for 0.2 ms before. ONNX Runtime kept warm runs for 0.2 ms before; what is asked of one kept warm is held against that.
 - *everything out of the caches*: 128 MiB of other data are read before each run; of so few runs no thousandth is told.
 - OpenVINO and Keras are there if `make bench-peers` ran before: their packages take 2 GB.
 - *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last six
   rows are of three processes, one after the other: compare them with one another.
-- *missed*: answers that did not come within 0.9 ms of the state; quantiles are of those that did.
+- *missed*: answers that did not come within 0.9 ms of the state; they count as 0.9 ms in the quantiles.
+- *inference* is guard and network together, as the service measures them; one arm, position alone.
 - The cost of a run is bytes over bandwidth: the growth tables give both. Below some 0.1 MB what is done once per layer counts, beyond
   the third cache the memory's bandwidth.
 ";

@@ -187,7 +187,7 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
     let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
     let mut whole = Vec::with_capacity((seconds * 1000) as usize);
     let mut handed_over = Vec::with_capacity((seconds * 1000) as usize);
-    let (mut missed, mut valid) = (0_u64, 0_u64);
+    let (mut answered, mut missed, mut valid) = (0_u64, 0_u64, 0_u64);
     let mut next = now_ns();
     for sequence in 1..=WARM_UP + seconds * 1000 {
         let state = state(sequence);
@@ -204,12 +204,14 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
             .map_err(|error| error.to_string())?;
         let took = now_ns() - sent;
         if sequence > WARM_UP {
-            match answer {
-                Some(pose) => {
-                    whole.push(took);
-                    valid += u64::from(pose.arm[0].status == ArmStatus::Valid as u32);
-                }
-                None => missed += 1,
+            if let Some(pose) = answer {
+                whole.push(took);
+                answered += 1;
+                valid += u64::from(pose.arm[0].status == ArmStatus::Valid as u32);
+            } else {
+                // As long at least.
+                whole.push(PATIENCE_NS);
+                missed += 1;
             }
             if answer.is_none() && world.ended() {
                 println!("note: {}", world.last_words());
@@ -221,8 +223,8 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
         sleep_until_ns(next);
     }
     let Some(stats) = world.stop() else { return Ok(None) };
-    if valid * 2 < whole.len() as u64 {
-        return Err(format!("only {valid} of {} answers were valid: this measures fallback", whole.len()));
+    if valid * 2 < answered {
+        return Err(format!("only {valid} of {answered} answers were valid: this measures fallback"));
     }
     Ok(Some(Measured { whole, handed_over, missed, stats }))
 }
@@ -305,8 +307,8 @@ pub(crate) fn asked(table: &Table, waits: &[&str]) -> Table {
         let (Some(inference), Some(total), Some(whole)) = (median("inference"), median("total"), median("input_to_output")) else {
             continue;
         };
-        all.row(&format!("{wait}: input to output, at most the network's and 3 us and a hop"), &met(inference + 3.0 + hop, whole));
-        all.row(&format!("{wait}: the loop's own cost (total less inference), below"), &met(2.0, total - inference));
+        all.row(&format!("{wait}: input to output, at most guard and network, 3 us and a hop"), &met(inference + 3.0 + hop, whole));
+        all.row(&format!("{wait}: the loop's own cost (total less guard and network), below"), &met(2.0, total - inference));
     }
     all
 }

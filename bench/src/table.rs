@@ -34,6 +34,11 @@ impl Table {
         self.rows.iter().find(|(row, _)| row.starts_with(start)).map(|(_, values)| values.as_slice())
     }
 
+    /// The first row whose name starts and ends so.
+    pub(crate) fn find_with(&self, start: &str, end: &str) -> Option<&[f64]> {
+        self.rows.iter().find(|(row, _)| row.starts_with(start) && row.ends_with(end)).map(|(_, values)| values.as_slice())
+    }
+
     /// From the row on whose name starts so, up to the next that is not one of its parts (indented further).
     pub(crate) fn rows_after(&self, start: &str) -> &[(String, Vec<f64>)] {
         let Some(first) = self.rows.iter().position(|(row, _)| row.starts_with(start)) else { return &[] };
