@@ -17,6 +17,8 @@ pub struct Sketch(BTreeSet<u64>);
 
 /// Rows of a table that are hashed together: one row of a few coarse columns may be in any run, so many in this order are not.
 const WINDOW: usize = 32;
+/// Fewest of them that differ from the one before.
+const CHANGES: usize = WINDOW / 4;
 
 /// The sketch of a table's rows, one window after the other, each beginning a row later.
 #[derive(Debug, Default)]
@@ -26,15 +28,14 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// Adds a row. One like the last is passed over: where nothing changes there is nothing to know a run by.
+    /// Adds a row. Where little changes there is nothing to know a run by.
     pub(super) fn add(&mut self, row: impl IntoIterator<Item = f32>) {
-        let row = hashed(row.into_iter().map(|number| u64::from(number.to_bits())));
-        if self.rows.back() == Some(&row) {
-            return;
-        }
-        self.rows.push_back(row);
+        self.rows.push_back(hashed(row.into_iter().map(|number| u64::from(number.to_bits()))));
         if self.rows.len() == WINDOW {
-            self.sketch.insert(hashed(self.rows.iter().copied()));
+            let changes = self.rows.iter().zip(self.rows.iter().skip(1)).filter(|(one, next)| one != next).count();
+            if changes >= CHANGES {
+                self.sketch.insert(hashed(self.rows.iter().copied()));
+            }
             self.rows.pop_front();
         }
     }
