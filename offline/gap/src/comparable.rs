@@ -26,6 +26,14 @@ const SAME_TORQUE: f64 = 0.95;
 /// commands, of another run, or of another robot.
 pub(crate) fn elsewhere(robot: &Robot, real: &Run, sim: &Run) -> Option<DataQuality> {
     let (real, sim) = common(real, sim).ok()?;
+    if let Some((joint, like)) = exchanged(robot, &real, &sim) {
+        let message = format!(
+            "{} moves as {} does in the simulation {}, and not as its own: columns in another order (messages of ROS have joints sorted by name); \
+             give both sides the joints in the order of the robot's file",
+            robot.joints[joint], robot.joints[like], sim.id
+        );
+        return Some(DataQuality::new("same_motion", Level::Fail, message).run(real.id.clone()));
+    }
     let n = robot.joint_count();
     let times = |j: usize| {
         let (distance, spread) = apart(robot, &real, &sim, j);
@@ -48,6 +56,18 @@ pub(crate) fn elsewhere(robot: &Robot, real: &Run, sim: &Run) -> Option<DataQual
         robot.joints[joint]
     );
     Some(DataQuality::new("same_motion", Level::Fail, message).run(real.id.clone()).value(times, "1"))
+}
+
+/// A joint that goes as another one does in the simulation, where neither goes as its own.
+fn exchanged(robot: &Robot, real: &Run, sim: &Run) -> Option<(usize, usize)> {
+    let n = robot.joint_count();
+    let moving = |j: &usize| robot.moves(*j, &real.position[*j]) && robot.moves(*j, &sim.position[*j]);
+    let alike = |j: usize, k: usize| {
+        correlation_and_scale(&real.position[j], &sim.position[k]).is_some_and(|(correlation, _)| correlation > POSITION_ALIKE)
+    };
+    let odd: Vec<usize> = (0..n).filter(|j| moving(j) && !alike(*j, *j)).collect();
+    let pairs = odd.iter().flat_map(|j| odd.iter().map(move |k| (*j, *k)));
+    pairs.filter(|(j, k)| j != k).find(|(j, k)| alike(*j, *k))
 }
 
 /// What makes a comparison useless: all of it failures.

@@ -320,7 +320,13 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate, window: 
             form if LATE_TORQUES.contains(&form) => return Err("the simulator has no late torque".to_owned()),
             _ => DelayChannel::EndEffector,
         }),
-        ("payload" | "gravity_direction" | "frame_misalignment", _) => Bound::Robot,
+        ("gravity_direction", _) => {
+            for name in ["a", "b"] {
+                let _ = parameters.0.entry(name.to_owned()).or_insert(Value::Number(0.0));
+            }
+            Bound::Robot
+        }
+        ("payload" | "frame_misalignment", _) => Bound::Robot,
         ("external_contact", _) => {
             let angles = candidate.shape_of("azimuth").zip(candidate.shape_of("elevation"));
             let (azimuth, elevation) = angles.ok_or("a force without a wall is not a term of the simulator")?;

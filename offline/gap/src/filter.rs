@@ -1,6 +1,10 @@
 //! One smoothing for everything: a Gaussian window and its first two derivatives, zero phase.
 //!
 //! Every term of an equation passes the same window (gap-design.md, section 1), so that filtering alone creates no verdict.
+//!
+//! This module contains `unsafe`: a call of a function compiled for an instruction set that was found on this machine. It gives the same bits.
+
+#![expect(clippy::inline_always, reason = "inlined into a function compiled for an instruction set, or it would not use it")]
 
 /// Samples of the window on each side, in standard deviations.
 const REACH: f64 = 4.0;
@@ -75,9 +79,7 @@ impl Window {
         let (n, half) = (series.len(), self.half);
         let mut out = Vec::with_capacity(n);
         out.extend((0..half.min(n)).map(|i| self.held(weights, series, i)));
-        while out.len() + SIDE_BY_SIDE <= n.saturating_sub(half) {
-            out.extend(side_by_side(weights, &series[out.len() - half..]));
-        }
+        summed(weights, half, series, &mut out);
         out.extend((out.len()..n).map(|i| self.held(weights, series, i)));
         out
     }
@@ -116,7 +118,31 @@ impl Window {
     }
 }
 
+/// Appends sums that lean on no sample beyond the ends, so many at a time.
+fn summed(weights: &[f64], half: usize, series: &[f64], out: &mut Vec<f64>) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the instruction set was found on this machine.
+        return unsafe { summed_avx2(weights, half, series, out) };
+    }
+    summed_any(weights, half, series, out);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn summed_avx2(weights: &[f64], half: usize, series: &[f64], out: &mut Vec<f64>) {
+    summed_any(weights, half, series, out);
+}
+
+#[inline(always)]
+fn summed_any(weights: &[f64], half: usize, series: &[f64], out: &mut Vec<f64>) {
+    while out.len() + SIDE_BY_SIDE <= series.len().saturating_sub(half) {
+        out.extend(side_by_side(weights, &series[out.len() - half..]));
+    }
+}
+
 /// Weighted sums of a series from each of its first places on.
+#[inline(always)]
 fn side_by_side(weights: &[f64], series: &[f64]) -> [f64; SIDE_BY_SIDE] {
     let mut sums = [0.0; SIDE_BY_SIDE];
     for (k, weight) in weights.iter().enumerate() {

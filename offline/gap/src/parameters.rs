@@ -74,7 +74,11 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             all.extend(["c_x", "c_y", "c_z"].map(|name| named(name, "m", shaped(name))));
             all
         }
-        ("gravity_direction", _) => vec![named("a", "rad", theta[0]), named("b", "rad", theta[1])],
+        // What the motion does not show of it is not told.
+        ("gravity_direction", _) => {
+            let at = |angle: &str| candidate.family.shape.iter().position(|name| *name == angle);
+            ["a", "b"].iter().filter_map(|name| Some(named(name, "rad", theta[at(name)?]))).collect()
+        }
         ("link_inertia", "scaled") => vec![named("dpi_B", "kg", theta[0] * robot.arm.link_inertia(joint).parameters()[0])],
         ("link_inertia", _) => {
             let k = shaped("parameter") as usize;

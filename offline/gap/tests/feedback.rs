@@ -31,12 +31,14 @@ fn with(physics: &str, bound: Bound, parameters: &[(&str, f64)]) -> RobotModel {
     model
 }
 
+/// Joints of the built-in robot: unit, middle and reach.
+const RAVEN: [(&str, f64, f64); 3] = [("rad", 0.6, 0.35), ("rad", 1.5, 0.3), ("m", 0.4, 0.05)];
+
 /// Commands that move every joint at several speeds.
-fn commands(seed: u64) -> Recording {
+fn commands(seed: u64, joints: &[(&str, f64, f64)]) -> Recording {
     let mut random = Random::new(seed, 1);
-    let home = [0.6, 1.5, 0.4];
-    let reach = [0.35, 0.3, 0.05];
-    let tones: Vec<[(f64, f64, f64); 3]> = (0..3)
+    let tones: Vec<[(f64, f64, f64); 3]> = joints
+        .iter()
         .map(|_| {
             std::array::from_fn(|k| {
                 let rate = 2.0 * std::f64::consts::PI * [0.11, 0.27, 0.53][k] * random.between(0.85, 1.15);
@@ -46,9 +48,9 @@ fn commands(seed: u64) -> Recording {
         .collect();
     let time: Vec<f64> = (0..(RUN_S * 1e3) as usize).map(|i| i as f64 * 1e-3).collect();
     let mut columns = vec![Column::new("t_s", time.clone())];
-    for (j, tones) in tones.iter().enumerate() {
-        let name = format!("jpos_d_{}_{}", j + 1, ["rad", "rad", "m"][j]);
-        let at = |t: f64| home[j] + reach[j] * tones.iter().map(|(size, rate, phase)| size * (rate * t + phase).sin()).sum::<f64>();
+    for (j, (tones, (unit, home, reach))) in tones.iter().zip(joints).enumerate() {
+        let name = format!("jpos_d_{}_{unit}", j + 1);
+        let at = |t: f64| home + reach * tones.iter().map(|(size, rate, phase)| size * (rate * t + phase).sin()).sum::<f64>();
         let series = time.iter().map(|t| at(*t)).collect();
         columns.push(Column::new(name, series));
     }
@@ -57,7 +59,11 @@ fn commands(seed: u64) -> Recording {
 
 /// What a robot does along them, as its sensors see it.
 fn recorded(robot: &RobotModel, seed: u64) -> Recording {
-    let run = Run::from_recording(&commands(seed), robot).expect("commands");
+    recorded_along(robot, seed, &RAVEN)
+}
+
+fn recorded_along(robot: &RobotModel, seed: u64, joints: &[(&str, f64, f64)]) -> Recording {
+    let run = Run::from_recording(&commands(seed, joints), robot).expect("commands");
     let options = ClosedLoop { settle_s: 1.0, ..ClosedLoop::default() };
     let mut out = closed_loop(robot, &run, options).expect("a run").to_recording(&format!("run {seed}"), robot);
     let mut random = Random::new(seed, 2);
@@ -75,10 +81,22 @@ fn recorded(robot: &RobotModel, seed: u64) -> Recording {
 }
 
 fn gap(model: &RobotModel, real: &[Recording]) -> Outcome {
+    gap_beside(model, real, &[])
+}
+
+/// The same beside the runs of a simulator, if there are any.
+fn gap_beside(model: &RobotModel, real: &[Recording], sim: &[Recording]) -> Outcome {
     let sha = "0".repeat(64);
     let given: Vec<Given> = real
         .iter()
-        .map(|run| Given { id: run.name.clone(), real: run.clone(), real_sha256: sha.clone(), notes: Vec::new(), sim: None })
+        .enumerate()
+        .map(|(k, run)| Given {
+            id: run.name.clone(),
+            real: run.clone(),
+            real_sha256: sha.clone(),
+            notes: Vec::new(),
+            sim: sim.get(k).map(|sim| (sim.clone(), sha.clone())),
+        })
         .collect();
     let options = Options { config_sha256: sha, ..Options::default() };
     let outcome = analyse(model, &given, &options, &mut |_| {}).expect("a report");
@@ -210,4 +228,32 @@ fn what_does_not_fit_the_memory_is_refused_with_the_way_out() {
     let line = with(|| Some(1 << 20)).expect_err("a mebibyte").to_string();
     assert!(line.contains("GiB of memory, 0.0 are free") && line.contains("ravenpose convert --from S --to S"), "{line}");
     assert!(with(|| Some(1 << 34)).is_ok());
+}
+
+/// Two links that turn in one vertical plane.
+const PLANAR: &str = r#"<robot name="planar"><link name="base"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin rpy="-1.5708 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="100" velocity="10"/></joint>
+<link name="upper"><inertial><origin xyz="0.17 0 0.01"/><mass value="2.5"/><inertia ixx="0.002" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.35 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="100" velocity="10"/></joint>
+<link name="lower"><inertial><origin xyz="0.12 0 0.02"/><mass value="1.2"/><inertia ixx="0.001" iyy="0.012" izz="0.012" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="tip" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0.3 0 0"/></joint><link name="tool"/></robot>"#;
+
+#[test]
+fn a_base_is_tilted_in_the_plane_in_which_all_joints_turn() {
+    // Out of that plane a tilt shows nothing: it fitted noise by more than a tilt can be, and the whole was refused for a steady force.
+    const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.7), ("rad", 0.5, 0.9)];
+    let folder = std::env::temp_dir().join(format!("ravenpose-planar-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("folder");
+    let urdf = folder.join("planar.urdf");
+    std::fs::write(&urdf, PLANAR).expect("written");
+    let robot = RobotModel::load(urdf.to_str().expect("UTF-8")).expect("a robot");
+    drop(std::fs::remove_dir_all(&folder));
+    let mut tilted = robot.clone();
+    let tilt = Physics::new("gravity_direction", &Parameters::of(&[("a", 0.0), ("b", 0.05)])).expect("a name").expect("parameters");
+    tilted.effects_mut().push(Effect::new(tilt, Bound::Robot));
+    let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
+    let outcome = gap_beside(&robot, &runs(&tilted), &runs(&robot));
+    assert_eq!(named(&outcome.report), ["gravity_direction"], "{}", outcome.report.summary);
+    let parameters = &outcome.report.verdicts[0].parameters;
+    assert!(parameters.len() == 1 && parameters[0].name == "b" && (parameters[0].value - 0.05).abs() < 0.005, "{parameters:?}");
 }

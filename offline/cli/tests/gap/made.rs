@@ -697,3 +697,16 @@ fn a_step_beside_a_slow_drift_is_no_cable_that_creeps() {
     assert_eq!(names, ["joint_offset", "thermal_drift"], "{}", report.summary);
     assert!(primary(&report).iter().all(|verdict| verdict.location.joint == ["shoulder"]), "{}", report.summary);
 }
+
+#[test]
+fn a_robot_with_less_friction_than_the_simulation_has_less_friction() {
+    // It could only have more: less was a motor that warms up, with probability 1.
+    let folder = Folder::new("less-friction");
+    for (physics, name, value) in [("coulomb_friction", "f_c", -0.3), ("viscous_friction", "b", -0.3)] {
+        let (case, _) = made(&folder, &format!("less-{name}"), &[wanted(physics, Some(1), &[(name, value)])], 15.0);
+        let report = case.judged(&folder.file(&format!("out-{name}")));
+        named(&report, physics, "shoulder");
+        assert_eq!(primary(&report).len(), 1, "{}", report.summary);
+        holds(primary(&report)[0], name, value, 0.1);
+    }
+}

@@ -144,6 +144,32 @@ fn a_simulation_of_another_robot_or_of_other_commands_gives_no_verdict() {
 }
 
 #[test]
+fn joints_in_another_order_are_told_by_their_names() {
+    let folder = Folder::new("sides-order");
+    let case = friction(&folder);
+    // Shoulder and elbow exchanged, as by a log that sorts them.
+    let exchanged = |(k, path): (usize, &PathBuf)| {
+        let all = lines(path);
+        let head: Vec<String> = all[0]
+            .split(',')
+            .map(|name| match name {
+                name if name.contains("_1_") => name.replace("_1_", "_2_"),
+                name if name.contains("_2_") => name.replace("_2_", "_1_"),
+                name => name.to_owned(),
+            })
+            .collect();
+        folder.write(&format!("exchanged-{k}.csv"), format!("{}\n{}\n", head.join(","), all[1..].join("\n")))
+    };
+    let real = case.real.iter().enumerate().map(exchanged).collect();
+    let out = folder.file("out");
+    let report = report(&out, &Case { real, sim: case.sim.clone(), robot: case.robot.clone() }.gap(&out));
+    assert_eq!(report.status, Status::InsufficientData, "{}", report.summary);
+    let first = &report.data_quality[0];
+    assert_eq!((first.check.as_str(), first.level), ("same_motion", Level::Fail), "{}", first.message);
+    assert!(first.message.starts_with("shoulder moves as elbow does in the simulation"), "{}", first.message);
+}
+
+#[test]
 fn a_simulation_that_moves_a_little_otherwise_takes_the_comparison_from_all_and_the_report_says_so() {
     let folder = Folder::new("sides-otherwise");
     let case = friction(&folder);

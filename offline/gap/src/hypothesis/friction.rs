@@ -97,8 +97,11 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     // No more can fade than there is.
     let coulomb = dictionary.problem.nominal.drives[j][2];
     let fades = if coulomb > 0.0 { Bound::Between(-coulomb, coulomb) } else { Bound::Free };
+    // Nor can the robot have less friction than none: of what the simulation has at this place, all may be too much.
+    let least = |there: f64| if there > 0.0 && !at_link { Bound::Between(-there, f64::INFINITY) } else { positive };
+    let (level, per_speed) = (least(coulomb), least(dictionary.problem.nominal.drives[j][1]));
     for (names, starts, sign) in [speeds, bristles] {
-        all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[positive], names, starts.clone(), move |d, s| {
+        all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[level], names, starts.clone(), move |d, s| {
             vec![d.effort_of(j, smooth(d, place, s, sign), at_link)]
         }));
         for &(form, of, more) in &loads {
@@ -129,7 +132,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             );
         }
     }
-    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[Bound::Positive], move |d| {
+    all.push(Family::fixed("viscous_friction", &[j], form, TORQUE, &[per_speed], move |d| {
         vec![d.effort_of(j, velocity(d), at_link)]
     }));
     let slow = STRIBECK_SPEED.map(|share| share * speed);

@@ -30,6 +30,15 @@ type Number = (usize, usize);
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[FURTHEST; 2], &["a", "b"], |d, s| turned(d, s).into()));
     let weights = Weights::new(dictionary);
+    if let Some(axis) = only_axis(dictionary, &weights) {
+        let name = ["a", "b"][axis];
+        let about = move |x: f64| if axis == 0 { [x, 0.0] } else { [0.0, x] };
+        all.push(Family::secant("gravity_direction", &[], "turned about one axis", TORQUE, &[FURTHEST], &[name], move |d, s| {
+            let angle = if s[0].abs() < LEAST { LEAST } else { s[0] };
+            let [a, b] = about(angle);
+            vec![d.difference(&d.loads_of(&tilted(d, a, b)), d.believed(), angle, true)]
+        }));
+    }
     let Some(about) = weights.angles(dictionary) else { return };
     let numbers = told_apart(dictionary, &weights, &about);
     if numbers.is_empty() {
@@ -43,6 +52,14 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     });
     family.grid = vec![about.to_vec()];
     all.push(family.penalised(2.0));
+}
+
+/// The axis about which alone a turn is seen in the first order: joints that are all parallel turn in a plane, and a turn out of it that is as
+/// large as may be fits noise.
+fn only_axis(d: &Dictionary, weights: &Weights) -> Option<usize> {
+    let sizes = turned(d, &[0.0; 2]).map(|column| weights.dot(&column, &column).sqrt());
+    let largest = usize::from(sizes[1] > sizes[0]);
+    (sizes[1 - largest] < TOLD_APART * sizes[largest]).then_some(largest)
 }
 
 /// The torque by which links as they are believed load the joints, per unit of each angle: along the shortest way, first a, then b.
