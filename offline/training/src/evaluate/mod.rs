@@ -284,7 +284,6 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         ..wish.reading.clone()
     };
     let mut set = data::read(wish.data, &reading, &mut |done, all| told(&format!("{done} of {all} recordings read")))?;
-    refuse_twins(&set)?;
     // As the service reads it.
     let refused = |error: CardError| TrainingError::Model { file: shown(wish.model), what: error.to_string() };
     let card = set.is_raven.then(|| Card::read(&model.card, target)).transpose().map_err(refused)?;
@@ -325,6 +324,7 @@ pub fn evaluate(wish: &Wish, told: &mut dyn FnMut(&str)) -> Result<Report, Train
         });
     }
     let own_inputs = set.inputs() - model.chain.remembered();
+    refuse_twins(&set)?;
     let (train, test, known) = parts(&model, set.trajectories);
     if test.is_empty() {
         return Err(TrainingError::Unfit {
