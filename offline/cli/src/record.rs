@@ -151,7 +151,7 @@ pub(crate) fn run(out: &Path, seconds: Option<f64>, cameras: &webcams::Wish) -> 
     }
     if tally.states + tally.poses == 0 {
         complain!(
-            "ravenpose: {}: no state and no pose was heard; do service and controller run, as this user, with this RAVENPOSE_PREFIX?",
+            "ravenpose: {}: no state and no pose was heard; do service and controller run, as this user, with this RAVENPOSE_PREFIX and RAVENPOSE_ROOT?",
             out.display()
         );
         whole = false;
