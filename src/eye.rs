@@ -1,6 +1,7 @@
 //! Looks at the link as a newcomer finds it, in a thread of its own: that reads and writes files, on a disk that may hang, and whoever
 //! feeds the watchdog must not wait for one.
 
+use crate::writer::ends_within;
 use ravenpose_transport::{Probe, Settings, TransportError};
 use ravenpose_wire::{CorrectedPose, RavenState};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
@@ -11,7 +12,6 @@ use std::time::Duration;
 const PAUSE: Duration = Duration::from_secs(1);
 /// How long the last look may take when the service ends.
 const CLOSE_MAX: Duration = Duration::from_millis(200);
-const CLOSE_TICK: Duration = Duration::from_millis(5);
 
 /// What a newcomer finds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct Sight {
 pub struct Eye {
     sights: Receiver<Result<Sight, String>>,
     /// Dropped, it ends the thread.
-    open: Option<Sender<()>>,
+    open: Sender<()>,
     thread: JoinHandle<()>,
 }
 
@@ -59,7 +59,7 @@ impl Eye {
                 }
             })
             .map_err(|cause| format!("the thread that watches the link cannot be started: {cause}"))?;
-        Ok(Self { sights, open: Some(open), thread })
+        Ok(Self { sights, open, thread })
     }
 
     /// What it saw since the last call, if it has looked.
@@ -68,13 +68,9 @@ impl Eye {
     }
 
     /// Ends it, so that it leaves no files; a look that hangs is left to hang.
-    pub fn close(mut self) {
-        self.open = None;
-        let mut left = CLOSE_MAX;
-        while !self.thread.is_finished() && left > Duration::ZERO {
-            std::thread::sleep(CLOSE_TICK);
-            left = left.saturating_sub(CLOSE_TICK);
-        }
+    pub fn close(self) {
+        drop(self.open);
+        ends_within(&self.thread, CLOSE_MAX);
     }
 }
 

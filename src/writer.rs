@@ -64,12 +64,17 @@ impl Writer {
     pub fn finish(mut self, patience: Duration) -> bool {
         self.jobs = None;
         let Some(thread) = self.thread.take() else { return false };
-        let asked = Instant::now();
-        while !thread.is_finished() && asked.elapsed() < patience {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        thread.is_finished() && thread.join().is_ok()
+        ends_within(&thread, patience) && thread.join().is_ok()
     }
+}
+
+/// Does a thread end by itself in this time?
+pub(crate) fn ends_within<T>(thread: &JoinHandle<T>, patience: Duration) -> bool {
+    let asked = Instant::now();
+    while !thread.is_finished() && asked.elapsed() < patience {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    thread.is_finished()
 }
 
 fn write_all(jobs: &Receiver<Job>, stats_path: &Path, log: Option<&Log>) {

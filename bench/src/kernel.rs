@@ -114,23 +114,20 @@ impl Engine {
         }
     }
 
-    /// Sleeps until then; or reads the weights for the last part of it.
+    /// Sleeps until then; or keeps itself warm for the last part of it.
     fn await_input(&mut self, until_ns: i64) {
-        let begins_ns = until_ns - KEPT_WARM_NS;
-        match self {
-            Self::KeptWarm(plan) => {
-                sleep_until_ns(begins_ns);
-                while now_ns() < until_ns {
-                    std::hint::black_box(plan.memory().map(stream).fold(0, u64::wrapping_add));
-                }
-            }
-            Self::OnnxRuntimeKeptWarm(session, input) => {
-                sleep_until_ns(begins_ns);
-                while now_ns() < until_ns {
-                    std::hint::black_box(session.run(input));
-                }
-            }
-            _ => sleep_until_ns(until_ns),
+        let mut warm: Box<dyn FnMut() + '_> = match self {
+            Self::KeptWarm(plan) => Box::new(|| {
+                std::hint::black_box(plan.memory().map(stream).fold(0, u64::wrapping_add));
+            }),
+            Self::OnnxRuntimeKeptWarm(session, input) => Box::new(|| {
+                std::hint::black_box(session.run(input));
+            }),
+            _ => return sleep_until_ns(until_ns),
+        };
+        sleep_until_ns(until_ns - KEPT_WARM_NS);
+        while now_ns() < until_ns {
+            warm();
         }
     }
 }
@@ -258,7 +255,7 @@ fn kept_warm(network: &Network, contenders: &[Contender]) -> Vec<Contender> {
         .into()
 }
 
-/// Where it is installed.
+/// ONNX Runtime, if it is installed, that runs until its input comes.
 fn runtime_kept_warm(bytes: &[u8], network: &Network) -> Result<Option<Contender>, String> {
     let Some(session) = runtime(bytes)? else { return Ok(None) };
     let inputs = inputs(network);

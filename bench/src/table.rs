@@ -31,7 +31,7 @@ impl Table {
 
     /// The first row whose name starts so.
     pub(crate) fn find_starting(&self, start: &str) -> Option<&[f64]> {
-        self.rows.iter().find(|(row, _)| row.starts_with(start)).map(|(_, values)| values.as_slice())
+        self.find_with(start, "")
     }
 
     /// The first row whose name starts and ends so.

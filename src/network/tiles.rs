@@ -6,7 +6,8 @@
 //! digits is left out: it is zero on average and no more than what rounding the weights did.
 //!
 //! A tile is sixteen outputs by four inputs: a cache line of high digits, and one of low digits, or half of one that it shares with its
-//! neighbour. There a byte is `16 a + b + 8` of the two low digits: its products as it is, less those of its lower half, are 16 times those of `a`. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.
+//! neighbour. There a byte is `16 a + b + 8` of the two low digits: its products as it is, less those of its lower half, are 16 times those
+//! of `a`. Up to eight tiles (a panel) that use the same inputs lie together, high digits first, in the order in which they are read.
 //!
 //! This module contains `unsafe`: vector loads through pointers whose bounds are checked once before the loop, and calls of functions
 //! compiled for an instruction set that was found on this machine.
