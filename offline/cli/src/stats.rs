@@ -109,9 +109,7 @@ fn table(stats: &Stats) -> String {
 }
 
 fn write_hgrm(stats: &Stats, hgrm: &Path) -> Result<(), String> {
-    if hgrm.is_dir() || hgrm.file_name().is_none() || hgrm.to_string_lossy().ends_with('/') {
-        return Err(format!("--hgrm {}: is a folder; name a file in it, such as run.hgrm", hgrm.display()));
-    }
+    output::check_file(hgrm, &[])?;
     let extension = hgrm.extension().map_or_else(|| "hgrm".into(), |e| e.to_string_lossy().into_owned());
     let stem = hgrm.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     for stage in &stats.stages {

@@ -37,7 +37,8 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
     let unit = |turning: &'static str, slid: &'static str| if sliding { slid } else { turning };
     let (effort, position) = (unit("N.m", "N"), unit("rad", "m"));
     let named = |name, unit, value| Named { name, unit, value };
-    let shaped = |name: &str| family.shape.iter().position(|n| *n == name).map_or(f64::NAN, |k| shape[k]);
+    let place = |name: &str| family.shape.iter().position(|n| *n == name);
+    let shaped = |name: &str| place(name).map_or(f64::NAN, |k| shape[k]);
     match (family.physics, family.form) {
         ("coulomb_friction", _) => vec![named("f_c", effort, theta[0])],
         ("viscous_friction", _) => vec![named("b", unit("N.m.s/rad", "N.s/m"), theta[0])],
@@ -65,8 +66,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             let mut all = vec![named("m_p", "kg", theta[0])];
             // What the motion does not show of its place is not told.
             let places = [("moment_x", "c_x"), ("moment_y", "c_y"), ("moment_z", "c_z")];
-            let at = |moment: &str| candidate.family.shape.iter().position(|name| *name == moment);
-            all.extend(places.iter().filter_map(|(moment, name)| Some(named(name, "m", theta[at(moment)?] / theta[0]))));
+            all.extend(places.iter().filter_map(|(moment, name)| Some(named(name, "m", theta[place(moment)?] / theta[0]))));
             all
         }
         ("payload", _) => {
@@ -75,10 +75,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             all
         }
         // What the motion does not show of it is not told.
-        ("gravity_direction", _) => {
-            let at = |angle: &str| candidate.family.shape.iter().position(|name| *name == angle);
-            ["a", "b"].iter().filter_map(|name| Some(named(name, "rad", theta[at(name)?]))).collect()
-        }
+        ("gravity_direction", _) => ["a", "b"].iter().filter_map(|name| Some(named(name, "rad", theta[place(name)?]))).collect(),
         ("link_inertia", "scaled") => vec![named("dpi_B", "kg", theta[0] * robot.arm.link_inertia(joint).parameters()[0])],
         ("link_inertia", _) => {
             let k = shaped("parameter") as usize;

@@ -126,11 +126,9 @@ pub fn friction_names() -> impl Iterator<Item = String> {
 /// memory has settled when the observer has weighed, too.
 pub fn append_friction(card: &LoadCard, plays: usize, one: &mut Trajectory) {
     let mut observer = LoadObserver::new(card.clone());
-    let mut weighed_after_s: Option<f64> = None;
     let mut weighed = Vec::with_capacity(one.rows());
     let seen = one.inputs.chunks_exact(FEATURES + plays).zip(&one.time_s).flat_map(|(row, time_s)| {
         observer.follow(row, (time_s * 1e9).round() as i64);
-        weighed_after_s = weighed_after_s.or(observer.has_weighed().then_some(*time_s));
         weighed.push(observer.has_weighed());
         [row, &observer.friction_nm()].concat()
     });
@@ -138,7 +136,6 @@ pub fn append_friction(card: &LoadCard, plays: usize, one: &mut Trajectory) {
     for (unsettled, has_weighed) in one.is_unsettled.iter_mut().zip(weighed) {
         *unsettled |= !has_weighed;
     }
-    one.settled_after_s = one.settled_after_s.zip(weighed_after_s).map(|(memory_s, friction_s)| memory_s.max(friction_s));
 }
 
 /// A trajectory whose friction nobody knew: one row in so many.

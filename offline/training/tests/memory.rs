@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Folder, runs, small};
+use common::{Folder, rewritten, runs, small};
 use ndarray::Array2;
 use ravenpose::config::ModelSource;
 use ravenpose::correction::Estimator;
@@ -14,7 +14,6 @@ use ravenpose_wire::{FEATURES, features};
 use recordings::open::{Opened, open};
 use recordings::stream::Record;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use training::chain::{Chain, Dense};
 use training::commands::{self, Model, Wish};
 use training::data::{self, Reading, Trajectory};
@@ -145,24 +144,11 @@ fn the_service_tells_the_network_the_friction_that_training_appended() {
     );
 }
 
-/// What is kept of a recording, as another.
-fn rewritten(of: &Path, file: PathBuf, keep: &mut dyn FnMut(Record) -> Option<Record>) -> PathBuf {
-    let Opened::States(mut source) = open(of).expect("recording") else { panic!("states") };
-    let mut sink = recordings::save::create_states(&file, recordings::save::StateFormat::Mcap, &[]).expect("file");
-    while let Some(record) = source.next().expect("record") {
-        if let Some(record) = keep(record) {
-            sink.write(&record).expect("written");
-        }
-    }
-    sink.finish().expect("written");
-    file
-}
-
 #[test]
 fn truths_belong_to_the_nearer_state_and_rows_count_from_the_first_of_them() {
     let folder = Folder::new("late-truths");
     let files = runs(&folder, 1, 20.0, ".mcap");
-    let rewritten = |name: &str, keep: &mut dyn FnMut(Record) -> Option<Record>| rewritten(&files[0], folder.file(name), keep);
+    let rewritten = |name: &str, keep: &mut dyn FnMut(Record) -> Option<Record>| rewritten(&folder, &files[0], name, keep);
     let reading = Reading { plays: small("default").plays(), truth_hz: 1000.0, ..Reading::default() };
     let read = |file| data::read(&[file], &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
     // States of 100 Hz, and cameras 7 ms after each, 3 ms before the next.
@@ -178,13 +164,13 @@ fn truths_belong_to_the_nearer_state_and_rows_count_from_the_first_of_them() {
     assert!(states > 500 && rows + 10 > states as usize, "{rows} rows of {states} states");
     // The memory has followed for three seconds when the first truth comes.
     let whole = read(files[0].clone());
-    let settled_s = whole.settled_after_s;
+    let settled_s = whole.settled_after_s();
     let late = read(rewritten("late.mcap", &mut |record| {
         let ns = record.time_ns();
         let early = ns - *begun_ns.get_or_insert(ns) < 3_000_000_000;
         (!(early && matches!(&record, Record::Truth(_)))).then_some(record)
     }));
-    match (settled_s, late.settled_after_s) {
+    match (settled_s, late.settled_after_s()) {
         (Some(of_whole), Some(of_late)) => assert!((of_late - (of_whole - 3.0).max(0.0)).abs() < 0.02, "{of_whole} {of_late}"),
         (of_whole, of_late) => panic!("twenty seconds settle no memory: {of_whole:?} {of_late:?}"),
     }
@@ -197,7 +183,7 @@ fn after_a_pause_the_memory_has_to_settle_again() {
     let reading = Reading { plays: small("default").plays(), truth_hz: 100.0, ..Reading::default() };
     let read = |file| data::read(&[file], &reading, &mut |_, _| {}).expect("run").trajectories.remove(0);
     let whole = read(files[0].clone());
-    let settled_s = whole.settled_after_s.expect("settles");
+    let settled_s = whole.settled_after_s().expect("settles");
     assert!(settled_s < 20.0, "{settled_s}");
     let unsettled = |one: &Trajectory, from_s: f64| {
         let row = one.time_s.iter().position(|time_s| *time_s >= from_s).expect("row");
@@ -205,11 +191,11 @@ fn after_a_pause_the_memory_has_to_settle_again() {
     };
     assert!(unsettled(&whole, settled_s - 0.05) && !unsettled(&whole, settled_s + 0.05) && !unsettled(&whole, 25.1));
     let mut begun_ns = None;
-    let paused = read(rewritten(&files[0], folder.file("paused.mcap"), &mut |record| {
+    let paused = read(rewritten(&folder, &files[0], "paused.mcap", |record| {
         let since_ns = record.time_ns() - *begun_ns.get_or_insert(record.time_ns());
         (!(25_000_000_000..25_060_000_000).contains(&since_ns)).then_some(record)
     }));
-    assert_eq!(paused.settled_after_s, whole.settled_after_s);
+    assert_eq!(paused.settled_after_s(), whole.settled_after_s());
     assert!(!unsettled(&paused, 24.9) && unsettled(&paused, 25.1));
     let mut thin = paused.clone();
     thin.thin(10);

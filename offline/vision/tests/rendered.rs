@@ -120,15 +120,12 @@ fn two_cameras_that_come_back_together_are_believed_after_some_frames() {
 fn a_camera_that_moved_after_it_was_calibrated_is_named() {
     let Some(folder) = data("vision-rendered") else { return };
     let scene = Folder::of_scene("moved", &folder.join("easy"), 14);
-    let calibrated = vision::commands::calibrate(&scene.0, Mode::Default).expect("calibrated");
+    let mut calibrated = vision::commands::calibrate(&scene.0, Mode::Default).expect("calibrated");
     for (turned_deg, moved) in [(0.0, vec![]), (0.5, vec![2])] {
-        let mut cameras = calibrated.cameras.clone();
         let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::y_axis(), f64::to_radians(turned_deg));
-        cameras[2].camera.rotation = turn * cameras[2].camera.rotation;
+        calibrated.cameras[2].camera.rotation = turn * calibrated.cameras[2].camera.rotation;
         let file = scene.0.join("cameras.toml");
-        let all =
-            vision::commands::Calibrated { cameras, ..vision::commands::calibrate(&scene.0, Mode::Default).expect("calibrated") };
-        vision::commands::write_cameras(&all, &file).expect("written");
+        vision::commands::write_cameras(&calibrated, &file).expect("written");
         let tracked = vision::commands::track(&file, &scene.0, Mode::Default, &mut |_, _| ()).expect("a measured recording");
         assert!(tracked.rows.iter().all(|row| row.found.is_ok()), "three cameras are enough");
         assert_eq!(tracked.moved().map(|(camera, _)| camera).collect::<Vec<_>>(), moved, "{turned_deg} degrees");

@@ -1,7 +1,7 @@
 //! Runs of an arm from a URDF: tidy tables.
 
 use super::workers::Watch;
-use super::{Wish, commands, files, finish, name, runs_away, workers};
+use super::{Wish, commands, files, finish, homing_line, name, runs_away, workers};
 use recordings::save::{self, TableFormat};
 use recordings::table::{Batch, ColumnCells, TableColumn, TableSink, rows_of_batch};
 use simulator::any_arm::{ArmCycle, ArmSimulation, trajectory};
@@ -61,7 +61,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
     let offsets = workers::all(&files, files.len(), total, wish.threads, |index, watch| {
         reaches(model, runs[index], &files[index], plan.seed, watch)
     })?;
-    let homing = plan.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"));
+    let homing = homing_line(wish);
     let mut text = format!("robot = {}\nseed = {}\n{homing}runs = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offset) in runs.iter().zip(&files).zip(offsets) {
         let offset = &offset[..model.joint_count()];

@@ -59,6 +59,11 @@ fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, Pa
     Ok((files, summary))
 }
 
+/// The line of the summary that tells how each run was homed, where that was asked for.
+fn homing_line(wish: &Wish<'_>) -> String {
+    wish.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"))
+}
+
 /// What is wrong with a run whose numbers grew without bound.
 fn runs_away(robot: &str) -> String {
     format!(

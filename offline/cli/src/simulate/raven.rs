@@ -1,7 +1,7 @@
 //! Runs of a RAVEN-II: full states with their truth.
 
 use super::workers::Watch;
-use super::{Wish, commands, files, finish, name, runs_away, workers};
+use super::{Wish, commands, files, finish, homing_line, name, runs_away, workers};
 use arm::{JOINTS, Side};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::stream::Record;
@@ -59,8 +59,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
             let begun = last.as_ref().map_or_else(|| Player::new(&plan, *run), |last| last.followed_by(&plan, *run));
             let mut player = begun.map_err(|error| error.to_string())?;
             offsets.push(plan.sides.iter().filter_map(|side| player.homing_offset(*side).copied()).collect());
-            let (seed, number) = (plan.seed.to_string(), (run.index + 1).to_string());
-            let homing = run.homing_seed.to_string();
+            let [seed, homing, number] = [plan.seed, run.homing_seed, run.index as u64 + 1].map(|number| number.to_string());
             let metadata = [("seed", seed.as_str()), ("homing_seed", &homing), ("run", &number), ("motion", motion_of(*run))];
             write(&mut player, model.name(), &metadata, &files[run.index], watch)?;
             last = Some(player);
@@ -68,7 +67,7 @@ fn made(wish: &Wish<'_>, model: &RobotModel, format: &str) -> Result<ExitCode, S
         Ok(offsets)
     })?;
     let offsets: Vec<Vec<[f64; JOINTS]>> = offsets.into_iter().flatten().collect();
-    let homing = plan.homing_seed.map_or_else(String::new, |seed| format!("homing seed = {seed}\n"));
+    let homing = homing_line(wish);
     let session = if plan.runs_per_session > 1 { format!("runs per session = {}\n", plan.runs_per_session) } else { String::new() };
     let mut text = format!("robot = {}\nseed = {}\n{homing}{session}runs = {}\n", model.name(), plan.seed, runs.len());
     for ((run, file), offsets) in runs.iter().zip(&files).zip(&offsets) {

@@ -30,16 +30,17 @@ type Number = (usize, usize);
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[FURTHEST; 2], &["a", "b"], |d, s| turned(d, s).into()));
     let weights = Weights::new(dictionary);
-    if let Some(axis) = only_axis(dictionary, &weights) {
+    let tangents = turned(dictionary, &[0.0; 2]);
+    if let Some(axis) = only_axis(&tangents, &weights) {
         let name = ["a", "b"][axis];
         let about = move |x: f64| if axis == 0 { [x, 0.0] } else { [0.0, x] };
         all.push(Family::secant("gravity_direction", &[], "turned about one axis", TORQUE, &[FURTHEST], &[name], move |d, s| {
-            let angle = if s[0].abs() < LEAST { LEAST } else { s[0] };
+            let angle = no_less(s[0]);
             let [a, b] = about(angle);
             vec![d.difference(&d.loads_of(&tilted(d, a, b)), d.believed(), angle, true)]
         }));
     }
-    let Some(about) = weights.angles(dictionary) else { return };
+    let Some(about) = weights.angles(dictionary, &tangents) else { return };
     let numbers = told_apart(dictionary, &weights, &about);
     if numbers.is_empty() {
         return;
@@ -56,17 +57,22 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 
 /// The axis about which alone a turn is seen in the first order: joints that are all parallel turn in a plane, and a turn out of it that is as
 /// large as may be fits noise.
-fn only_axis(d: &Dictionary, weights: &Weights) -> Option<usize> {
-    let sizes = turned(d, &[0.0; 2]).map(|column| weights.dot(&column, &column).sqrt());
+fn only_axis(tangents: &[Column; 2], weights: &Weights) -> Option<usize> {
+    let sizes = tangents.each_ref().map(|column| weights.dot(column, column).sqrt());
     let largest = usize::from(sizes[1] > sizes[0]);
     (sizes[1 - largest] < TOLD_APART * sizes[largest]).then_some(largest)
 }
 
 /// The torque by which links as they are believed load the joints, per unit of each angle: along the shortest way, first a, then b.
 fn turned(d: &Dictionary, s: &[f64]) -> [Column; 2] {
-    let [a, b] = [s[0], s[1]].map(|x| if x.abs() < LEAST { LEAST } else { x });
+    let [a, b] = [s[0], s[1]].map(no_less);
     let (first, both) = (d.loads_of(&tilted(d, a, 0.0)), d.loads_of(&tilted(d, a, b)));
     [d.difference(&first, d.believed(), a, true), d.difference(&both, &first, b, true)]
+}
+
+/// An angle of which a secant can be drawn.
+fn no_less(angle: f64) -> f64 {
+    if angle.abs() < LEAST { LEAST } else { angle }
 }
 
 fn tilted(d: &Dictionary, a: f64, b: f64) -> SerialArm {
@@ -132,12 +138,11 @@ impl Weights {
     }
 
     /// About which angles the residuals are turned by.
-    fn angles(&self, d: &Dictionary) -> Option<[f64; 2]> {
-        let [one, other] = turned(d, &[0.0; 2]);
+    fn angles(&self, d: &Dictionary, [one, other]: &[Column; 2]) -> Option<[f64; 2]> {
         let cells = d.problem.cells.iter().enumerate();
         let residual = Column { parts: cells.map(|(k, cell)| (k, cell.residual.iter().map(|x| *x as f32).collect())).collect() };
-        let (aa, ab, bb) = (self.dot(&one, &one), self.dot(&one, &other), self.dot(&other, &other));
-        let (a, b) = (self.dot(&one, &residual), self.dot(&other, &residual));
+        let (aa, ab, bb) = (self.dot(one, one), self.dot(one, other), self.dot(other, other));
+        let (a, b) = (self.dot(one, &residual), self.dot(other, &residual));
         let both = aa * bb - ab * ab;
         let angles = [(a * bb - b * ab) / both, (b * aa - a * ab) / both];
         angles.iter().all(|x| x.is_finite() && x.abs() > LEAST).then_some(angles)

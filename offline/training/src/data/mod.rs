@@ -48,8 +48,6 @@ pub struct Trajectory {
     pub sketch: Sketch,
     /// Per row: had the run's own memory yet to settle? Empty where there is none. A pause begins it anew.
     pub is_unsettled: Vec<bool>,
-    /// How long the run's own memory first took to settle, s from its first state; none if it never did, or there is none.
-    pub settled_after_s: Option<f64>,
 }
 
 impl Trajectory {
@@ -80,6 +78,11 @@ impl Trajectory {
         spacings.sort_by(f64::total_cmp);
         let median = spacings.get(spacings.len() / 2).copied().unwrap_or(0.0);
         spacings.iter().filter(|spacing| **spacing <= 2.0 * median).sum::<f64>() + median
+    }
+
+    /// When the run's own memory had settled first, s from its first row; none if it never did, or there is none.
+    pub fn settled_after_s(&self) -> Option<f64> {
+        self.is_unsettled.iter().position(|unsettled| !unsettled).map(|row| self.time_s[row])
     }
 
     /// Had the run's own memory settled by a row? True where there is none.

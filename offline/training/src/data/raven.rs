@@ -73,7 +73,6 @@ struct Pairing<'a> {
     features: [f32; FEATURES],
     possible: Guard,
     memory: Memory,
-    begun_ns: Option<i64>,
     young: Memory,
     /// How often it began anew, and when it does so next.
     young_begun: usize,
@@ -109,7 +108,6 @@ impl<'a> Pairing<'a> {
             features: [0.0; FEATURES],
             possible: Guard::new(None),
             memory: Memory::new(&reading.plays),
-            begun_ns: None,
             young: Memory::new(&reading.plays),
             young_begun: 0,
             young_since_ns: i64::MIN,
@@ -145,11 +143,7 @@ impl<'a> Pairing<'a> {
     }
 
     fn follow(&mut self, stamp_ns: i64) {
-        let begun_ns = *self.begun_ns.get_or_insert(stamp_ns);
         self.memory.follow(&self.features, stamp_ns);
-        if !self.memory.is_empty() && self.found.settled_after_s.is_none() && self.memory.is_settled() {
-            self.found.settled_after_s = Some(stamp_ns.saturating_sub(begun_ns) as f64 * 1e-9);
-        }
         if stamp_ns >= self.young_until_ns {
             self.young.forget();
             self.young_since_ns = stamp_ns;
@@ -307,10 +301,6 @@ impl<'a> Pairing<'a> {
             return Err(TrainingError::NoTruth { file, looked_for });
         }
         self.found.exact.clone_from(&self.found.labels);
-        // The memory follows the states from the first on; rows count from the first truth.
-        if let (Some(begun_ns), Some(start_ns), Some(after_s)) = (self.begun_ns, self.start_ns, &mut self.found.settled_after_s) {
-            *after_s = (*after_s - start_ns.saturating_sub(begun_ns) as f64 * 1e-9).max(0.0);
-        }
         Ok(self.found)
     }
 }

@@ -57,7 +57,7 @@ pub(super) fn trust(
     leaving.truncate(LEAVING);
     trust.leaving = leaving;
     if !model.chain.plays.is_empty() {
-        trust.settled_after_s = test.iter().map(|one| one.settled_after_s).collect();
+        trust.settled_after_s = test.iter().map(Trajectory::settled_after_s).collect();
     }
     if let Some(card) = card {
         let mut admitted = doubtful.iter().map(|doubtful| !doubtful);

@@ -71,12 +71,21 @@ pub(crate) fn runs_of(robot: Robot, seed: u64, folder: &Folder, count: usize, se
 
 /// A recording with its records changed, in their order.
 pub(crate) fn changed(folder: &Folder, recording: &Path, name: &str, mut change: impl FnMut(&mut Record)) -> PathBuf {
-    let Opened::States(mut source) = open(recording).expect("recording") else { panic!("states") };
+    rewritten(folder, recording, name, |mut record| {
+        change(&mut record);
+        Some(record)
+    })
+}
+
+/// What is made of the records of a recording, those of which something is.
+pub(crate) fn rewritten(folder: &Folder, of: &Path, name: &str, mut made: impl FnMut(Record) -> Option<Record>) -> PathBuf {
+    let Opened::States(mut source) = open(of).expect("recording") else { panic!("states") };
     let file = folder.file(name);
     let mut sink = save::create_states(&file, StateFormat::Mcap, &[]).expect("file");
-    while let Some(mut record) = source.next().expect("record") {
-        change(&mut record);
-        sink.write(&record).expect("record");
+    while let Some(record) = source.next().expect("record") {
+        if let Some(record) = made(record) {
+            sink.write(&record).expect("record");
+        }
     }
     sink.finish().expect("file");
     file

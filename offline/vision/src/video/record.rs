@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
 /// Images that may wait between a camera and the disk; more are waited for, or lost by the camera itself.
 const WAITING: usize = 64;
@@ -103,9 +103,9 @@ fn all(
             let name = &rig.cameras[index].name;
             let file = out.join("frames").join(name).join(format!("{frames:06}.jpg"));
             // A camera that fell out while it wrote must not cost the other images.
-            if let Err(error) = sized(&shot.jpeg, rig, name) {
-                if error.is_size || images[index] == 0 {
-                    return Err(error.error);
+            if let Some(damage) = damage(&shot.jpeg, rig, name)? {
+                if images[index] == 0 {
+                    return Err(Error::content(&rig.file, name, damage, "record it anew"));
                 }
                 damaged[index] += 1;
                 continue;
@@ -128,7 +128,7 @@ fn all(
         let file = out.join("frames").join(&camera.name).join(format!("{frames:06}.jpg"));
         images[index] -= usize::from(std::fs::remove_file(file).is_ok());
     }
-    let ended = ended(&mut tracks, from_s, from_s + frames as f64 * step_s)?;
+    let ended = ended(tracks, from_s, from_s + frames as f64 * step_s)?;
     let rig_file = out.join("rig.toml");
     std::fs::copy(&rig.file, &rig_file).map_err(Error::write(&rig_file))?;
     let times = out.join("frames.csv");
@@ -137,48 +137,30 @@ fn all(
 }
 
 /// Which cameras ended before another that went on for longer, and what they said.
-fn ended(tracks: &mut [Option<Track>], from_s: f64, until_s: f64) -> Result<Vec<(usize, f64, Option<String>)>> {
-    let mut last_s = Vec::new();
-    for (index, track) in tracks.iter_mut().enumerate() {
-        let Some(track) = track else { continue };
+fn ended(tracks: Vec<Option<Track>>, from_s: f64, until_s: f64) -> Result<Vec<(usize, f64, Option<String>)>> {
+    let mut tracks: Vec<(usize, Track)> =
+        tracks.into_iter().enumerate().filter_map(|(index, track)| Some((index, track?))).collect();
+    for (_, track) in &mut tracks {
         while !track.live && track.last_s < until_s + LONGER_S && track.fetch()?.is_some() {
             track.take();
         }
-        last_s.push((index, track.last_s));
     }
-    let longest_s = last_s.iter().map(|(_, last_s)| *last_s).fold(f64::NEG_INFINITY, f64::max);
-    let early = last_s
-        .into_iter()
-        .filter(|(index, last_s)| last_s + LONGER_S <= longest_s && tracks[*index].as_ref().is_some_and(|track| track.over));
-    Ok(early
-        .map(|(index, last_s)| {
-            let said = tracks[index].as_ref().and_then(|track| track.said.lock().ok()?.clone());
-            (index, last_s - from_s, said)
-        })
-        .collect())
+    let longest_s = tracks.iter().map(|(_, track)| track.last_s).fold(f64::NEG_INFINITY, f64::max);
+    let early = tracks.into_iter().filter(|(_, track)| track.over && track.last_s + LONGER_S <= longest_s);
+    Ok(early.map(|(index, track)| (index, track.last_s - from_s, track.thread.join().ok().flatten())).collect())
 }
 
-/// What is wrong with an image, and whether it is its size.
-struct Unfit {
-    is_size: bool,
-    error: Error,
-}
-
-/// An image of another size makes all that follows wrong.
-fn sized(jpeg: &[u8], rig: &Rig, camera: &str) -> std::result::Result<(), Unfit> {
-    let unfit = |is_size, what, remedy: String| Err(Unfit { is_size, error: Error::content(&rig.file, camera, what, remedy) });
+/// What is wrong with an image that cannot be read. One of another size makes all that follows wrong, and is an error.
+fn damage(jpeg: &[u8], rig: &Rig, camera: &str) -> Result<Option<String>> {
     let reader = image::ImageReader::with_format(Cursor::new(jpeg), image::ImageFormat::Jpeg);
     let [w, h] = rig.size_px;
     match reader.into_dimensions() {
-        Ok(size) if size == (w, h) => Ok(()),
+        Ok(size) if size == (w, h) => Ok(None),
         Ok((a, b)) => {
             let what = format!("its video has {a} x {b} px");
-            unfit(true, what, format!("the rig says {w} x {h}: record in the size that was calibrated"))
+            Err(Error::content(&rig.file, camera, what, format!("the rig says {w} x {h}: record in the size that was calibrated")))
         }
-        Err(error) => {
-            let what = format!("an image of its video is no JPEG: {error}").replace('\n', " ");
-            unfit(false, what, "record it anew".to_owned())
-        }
+        Err(error) => Ok(Some(format!("an image of its video is no JPEG: {error}").replace('\n', " "))),
     }
 }
 
@@ -191,29 +173,25 @@ struct Track {
     live: bool,
     /// When its last image was taken, of those that were looked at.
     last_s: f64,
-    /// What it said at its end.
-    said: Arc<Mutex<Option<String>>>,
+    /// Ends with what the source said at its end.
+    thread: JoinHandle<Option<String>>,
 }
 
 impl Track {
     fn start(mut source: Box<dyn Source>) -> Self {
         let (sender, shots) = sync_channel(WAITING);
         let live = source.live();
-        let said = Arc::new(Mutex::new(None));
-        let words = Arc::clone(&said);
-        std::thread::spawn(move || {
+        let thread = std::thread::spawn(move || {
             while let Some(shot) = source.next().transpose() {
                 let fault = shot.is_err();
                 // Nobody listens any more: the recording is over.
                 if sender.send(shot).is_err() || fault {
-                    return;
+                    return None;
                 }
             }
-            if let Ok(mut words) = words.lock() {
-                *words = source.last_words();
-            }
+            source.last_words()
         });
-        Self { shots, held: None, ahead: None, over: false, live, last_s: f64::NEG_INFINITY, said }
+        Self { shots, held: None, ahead: None, over: false, live, last_s: f64::NEG_INFINITY, thread }
     }
 
     /// When the next image was taken; it is fetched and not taken.
