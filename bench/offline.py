@@ -1,8 +1,8 @@
 """Speed and memory of the offline tools: `make bench-offline` (part of `make bench`); `--minutes M` for another length.
 
 Times the simulator in its process (times real time, step, accuracy), then `ravenpose simulate` and conversions as a user runs them:
-seconds, times real time, MB/s of input, peak resident memory. Tracking of four cameras stage by stage. `ravenpose gap` on
-runs of rising length; `--only gap` does that alone; `--only growth` takes runs of 1 minute to 10 hours through simulator and converters (26 GB of
+seconds, times real time, MB/s of input, peak resident memory. Tracking of four cameras stage by stage. Training on the runs that were
+simulated. `ravenpose gap` on runs of rising length; `--only gap` does that alone; `--only growth` takes runs of 1 minute to 10 hours through simulator and converters (26 GB of
 disk, half an hour). `--out FILE` keeps what was printed.
 """
 import argparse
@@ -98,6 +98,17 @@ def recordings(folder, minutes):
     say(f"info: {seconds:.1f} s, peak {memory:.0f} MiB")
 
 
+def training(folder):
+    """An epoch of the paper's recipe and of the default one on the runs of `recordings`: three epochs less one, so that reading does not count."""
+    for preset in ["paper", "default"]:
+        train = [BIN / "ravenpose", "train", "--data", folder / "runs", "--preset", preset, "--truth-noise", "0.5", "--seed", "1"]
+        times = []
+        for epochs in ["1", "3"]:
+            seconds, memory = run([*train, "--epochs", epochs, "--out", folder / f"{preset}-{epochs}.onnx"])
+            times.append(seconds)
+        say(f"train --preset {preset} on these runs: {(times[1] - times[0]) / 2:.1f} s per epoch ({os.cpu_count()} cores), peak {memory:.0f} MiB")
+
+
 def growth(folder, lengths):
     """One run of each length, written, looked through and converted: what grows, and what must not."""
     for minutes in lengths:
@@ -137,6 +148,7 @@ def main():
             gap(folder)
         if options.only is None:
             recordings(folder, options.minutes)
+            training(folder)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     keep(options.out)

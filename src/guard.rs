@@ -59,6 +59,8 @@ pub const IMPOSSIBLE: [Limit; 31] = [
     limit(117, 1, 0.0, 0.1),                  // dt, s
 ];
 
+/// Features compared at once, for vector registers.
+const LANES: usize = 8;
 /// First of the nine numbers of the reported orientation.
 const ORIENTATION: usize = 6;
 /// By how much products of its rows may be off those of a rotation: logs keep a few digits.
@@ -131,15 +133,11 @@ impl Guard {
         (self.min[feature], self.max[feature])
     }
 
-    /// Checks one arm's features. Comparisons are written so that NaN fails them.
+    /// Checks one arm's features.
     pub fn check(&self, features: &[f32; FEATURES]) -> Verdict {
-        let mut finite = true;
-        let mut possible = true;
-        for ((value, min), max) in features.iter().zip(&self.min).zip(&self.max) {
-            finite &= value.is_finite();
-            possible &= *value >= *min && *value <= *max;
-        }
-        if !finite {
+        let mut possible = is_inside(features, &self.min, &self.max);
+        // The limits are finite: what is inside is so.
+        if !possible && !features.iter().all(|value| value.is_finite()) {
             return Verdict { reasons: flag::INPUT_NOT_FINITE, score: -1.0 };
         }
         possible &= features[ORIENTATION..].first_chunk().is_some_and(is_orientation);
@@ -149,6 +147,21 @@ impl Guard {
         }
         verdict
     }
+}
+
+/// Is each feature in its closed interval? NaN is in none.
+fn is_inside(features: &[f32; FEATURES], min: &[f32; FEATURES], max: &[f32; FEATURES]) -> bool {
+    let is_in = |value: f32, min: f32, max: f32| u32::from(value >= min) & u32::from(value <= max);
+    let (values, rest) = features.as_chunks::<LANES>();
+    let ((min, least), (max, most)) = (min.as_chunks::<LANES>(), max.as_chunks::<LANES>());
+    let mut inside = [1; LANES];
+    for ((values, min), max) in values.iter().zip(min).zip(max) {
+        for lane in 0..LANES {
+            inside[lane] &= is_in(values[lane], min[lane], max[lane]);
+        }
+    }
+    let rest = rest.iter().zip(least).zip(most).fold(1, |all, ((value, min), max)| all & is_in(*value, *min, *max));
+    inside.iter().fold(rest, |all, lane| all & lane) == 1
 }
 
 /// Is it a rotation, right-handed? Nine zeros are a log that does not say.
@@ -166,15 +179,21 @@ fn is_orientation(numbers: &[f32; 9]) -> bool {
 impl Domain {
     #[expect(clippy::neg_cmp_op_on_partial_ord, reason = "written so that NaN fails")]
     fn check(&self, features: &[f32; FEATURES], verdict: &mut Verdict) {
-        let mut inside = true;
-        let mut squares = 0.0_f32;
-        for (index, &value) in features.iter().enumerate() {
-            inside &= value >= self.min[index] && value <= self.max[index];
-            let distance = (value - self.center[index]) * self.weight[index];
-            squares += distance * distance;
+        let (values, rest) = features.as_chunks::<LANES>();
+        let ((centers, last_centers), (weights, last_weights)) =
+            (self.center.as_chunks::<LANES>(), self.weight.as_chunks::<LANES>());
+        let square = |value: f32, center: f32, weight: f32| ((value - center) * weight) * ((value - center) * weight);
+        let mut lanes = [0.0_f32; LANES];
+        for ((values, centers), weights) in values.iter().zip(centers).zip(weights) {
+            for lane in 0..LANES {
+                lanes[lane] += square(values[lane], centers[lane], weights[lane]);
+            }
         }
+        let rest =
+            rest.iter().zip(last_centers).zip(last_weights).map(|((value, center), weight)| square(*value, *center, *weight));
+        let squares = lanes.into_iter().chain(rest).sum::<f32>();
         verdict.score = squares.sqrt() / self.limit;
-        if !inside {
+        if !is_inside(features, &self.min, &self.max) {
             verdict.reasons |= flag::OUT_OF_RANGE;
         }
         // Written so that a NaN score is outside.
@@ -220,6 +239,17 @@ mod tests {
             tried[feature] = value.next_down();
             assert_ne!(guard.check(&tried).reasons & flag::OUT_OF_RANGE, 0, "{feature}");
         }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_said_of_each_feature() {
+        for (feature, value) in (0..FEATURES).flat_map(|feature| [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].map(|v| (feature, v)))
+        {
+            let mut tried = features();
+            tried[feature] = value;
+            assert_eq!(Guard::new(Some(domain())).check(&tried).reasons, flag::INPUT_NOT_FINITE, "{feature} {value}");
+        }
+        assert!(IMPOSSIBLE.iter().all(|limit| limit.min.is_finite() && limit.max.is_finite()));
     }
 
     #[test]

@@ -34,7 +34,7 @@ const TIGHT: &str = "The same in a tight loop, us";
 
 /// Sums the bytes of the weights as words: the least that any evaluation must read. Eight accumulators, like the kernel.
 #[inline(never)]
-fn stream(weights: &[u8]) -> u64 {
+pub(crate) fn stream(weights: &[u8]) -> u64 {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx512f") {
         // SAFETY: the instruction set was found on this machine.

@@ -11,6 +11,7 @@ mod openvino;
 mod page;
 mod path;
 mod soak;
+mod stages;
 mod svg;
 mod table;
 mod wheel;
@@ -44,26 +45,50 @@ struct Parts {
     tight_only: bool,
     growth: bool,
     memory: bool,
+    stages: bool,
     means: bool,
+    arms: bool,
     waits: Vec<&'static str>,
 }
 
 impl Parts {
-    /// All of `ci` or `full`, or what `RAVENPOSE_BENCH_ONLY` names: `tight` or `kernel` for the network alone; `memory` for what caches and pages bring; `sleep`, `spin` or
-    /// `event` for one way of waiting; `means` for what makes the default one fast.
+    /// All of `ci` or `full`, or what `RAVENPOSE_BENCH_ONLY` names: `tight` or `kernel` for the network alone; `memory` for what caches and pages bring; `stages` for a cycle's
+    /// parts; `sleep`, `spin` or `event` for one way of waiting; `means` for what makes the default one fast; `arms` for what arms and models cost.
     fn wanted(full: bool, only: Option<&str>) -> Result<Self, String> {
         const WAITS: [&str; 3] = ["sleep", "spin", "event"];
-        let nothing = Self { kernel: false, tight_only: false, growth: false, memory: false, means: false, waits: Vec::new() };
+        let nothing = Self {
+            kernel: false,
+            tight_only: false,
+            growth: false,
+            memory: false,
+            stages: false,
+            means: false,
+            arms: false,
+            waits: Vec::new(),
+        };
         Ok(match only {
-            None => Self { kernel: true, growth: true, memory: full, means: full, waits: WAITS.to_vec(), ..nothing },
+            None => Self {
+                kernel: true,
+                growth: true,
+                memory: full,
+                stages: true,
+                means: full,
+                arms: full,
+                waits: WAITS.to_vec(),
+                ..nothing
+            },
             Some("tight") => Self { kernel: true, tight_only: true, ..nothing },
             Some("kernel") => Self { kernel: true, ..nothing },
             Some("memory") => Self { memory: true, ..nothing },
+            Some("stages") => Self { stages: true, ..nothing },
             Some("means") => Self { means: true, ..nothing },
+            Some("arms") => Self { arms: true, ..nothing },
             Some(other) => match WAITS.into_iter().find(|wait| *wait == other) {
                 Some(wait) => Self { waits: vec![wait], ..nothing },
                 None => {
-                    return Err(format!("RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, memory, means, sleep, spin or event"));
+                    return Err(format!(
+                        "RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, memory, stages, means, arms, sleep, spin or event"
+                    ));
                 }
             },
         })
@@ -148,6 +173,9 @@ fn become_the_robot() {
     }
 }
 
+/// Services side by side: core, rounds, seconds of each.
+type Compared = fn(usize, usize, u64) -> Result<Table, String>;
+
 fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
     let (runs, seconds) = if full { (10_000, 40) } else { (3_000, 20) };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -164,11 +192,18 @@ fn measure(parts: &Parts, full: bool, write: bool) -> Result<(), String> {
         println!("{table}");
         tables.push(table);
     }
-    if parts.means || !parts.waits.is_empty() {
+    if parts.stages {
+        let table = on_core(service_core, stages::run)?;
+        println!("{table}");
+        tables.push(table);
+    }
+    if parts.means || parts.arms || !parts.waits.is_empty() {
         become_the_robot();
     }
-    if parts.means {
-        let table = path::means(service_core, 3, seconds / 4)?;
+    for (_, compared) in
+        [(parts.means, path::means as Compared), (parts.arms, path::arms)].into_iter().filter(|(wanted, _)| *wanted)
+    {
+        let table = compared(service_core, 3, seconds / 4)?;
         println!("{table}");
         tables.push(table);
     }

@@ -1,7 +1,7 @@
 //! What processes that are killed, or never read, cost the others: a robot at 1 kHz that goes on through all of it, quiet and disturbed in
 //! turn, block by block, so that what the machine does falls on all alike.
 
-use crate::path::{PATIENCE_NS, PERIOD_NS, World, state};
+use crate::path::{Arms, PATIENCE_NS, PERIOD_NS, World, state};
 use crate::soak::IDLE;
 use crate::table::{Table, quantiles};
 use ravenpose::realtime;
@@ -109,7 +109,7 @@ pub(crate) fn run(minutes: u64, only: Option<&str>, become_the_robot: fn(), core
 }
 
 fn ask(conditions: &[Condition], minutes: u64, become_the_robot: fn(), core: usize) -> Result<Table, String> {
-    let mut world = World::start("", core)?;
+    let mut world = World::start("", Arms::One, core)?;
     let settings = world.settings.clone();
     let (condition, stopped) = (AtomicUsize::new(BETWEEN_BLOCKS), AtomicBool::new(false));
     let (mut seen, disturbed) = std::thread::scope(|scope| {

@@ -11,8 +11,8 @@ const PAGE: &str = "# Performance
 Written by `make bench`: every table by one run of `ravenpose-bench full --write`, the offline tools by `bench/offline.py`
 just before it, Keras by `bench/keras_predict.py` when its lines say. Such machines are shared and noisy:
 compare by ratio, within one table. `make bench-ci` is the short part; `RAVENPOSE_BENCH_ONLY=tight` (`kernel`, `memory`,
-`sleep`, `spin`, `event`, `means`) one part of that. Simulator, recordings, vision and gap finder: `make bench-offline`; training:
-[training.md](training.md).
+`stages`, `sleep`, `spin`, `event`, `means`, `arms`) one part of that. Simulator, recordings, vision, training and gap finder: `make bench-offline`; recordings of 1 minute to
+10 hours: [recordings.md](recordings.md).
 
 - *asked*: what the project set itself; *met* is 1 or 0, and nothing is left out that this run missed.
 
@@ -26,9 +26,10 @@ compare by ratio, within one table. `make bench-ci` is the short part; `RAVENPOS
 - *What caches, pages and the core bring*: *read ahead* is reading that many bytes of the weights just before the clock starts; the last six
   rows are of three processes, one after the other: compare them with one another.
 - *missed*: answers that did not come within 0.9 ms of the state; they count as 0.9 ms in the quantiles.
-- *inference* is guard and network together, as the service measures them; one arm, position alone.
-- The cost of a run is bytes over bandwidth: the growth tables give both. Below some 0.1 MB what is done once per layer counts, beyond
-  the third cache the memory's bandwidth.
+- *inference* is guard and network together, as the service measures them; one arm, position alone. Guard, recording and the rest apart:
+  *A cycle's parts*.
+- The cost of a run is bytes over bandwidth: in the growth tables *floor* is that, the time to read the weights once from where they lie. Below some
+  0.1 MB what is done once per layer counts as well.
 ";
 
 /// What other programs printed, if they ran before.

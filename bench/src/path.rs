@@ -4,10 +4,12 @@
 //! This module contains `unsafe`: a signal to a child process.
 
 use crate::table::{Table, quantiles};
+use ravenpose::config::ModelSource;
 use ravenpose::realtime;
-use ravenpose::report::Stats;
+use ravenpose::report::{StageStats, Stats};
 use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
-use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState};
+use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState, features};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::Duration;
@@ -28,17 +30,20 @@ pub(crate) struct World {
     service: Child,
 }
 
+/// `allocations.c`, built; empty where there was nothing to build it with.
+const COUNTER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/allocations.so"));
+const COUNTS: &str = "allocations";
+
 impl World {
-    pub(crate) fn start(waiting: &str, core: usize) -> Result<Self, String> {
+    pub(crate) fn start(waiting: &str, arms: Arms, core: usize) -> Result<Self, String> {
         let dir = std::env::temp_dir().join(format!("ravenpose-bench-{}", std::process::id()));
         std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
         let settings = Settings { prefix: format!("rpbench{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
-        let model = std::fs::canonicalize("models/untrained.onnx").map_err(|cause| format!("models/untrained.onnx: {cause}"))?;
+        let models = arms.tables()?;
         let text = format!(
-            "allow_untrained = true\nallow_degraded = true\n{LIMITS}[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\n{waiting}\n[gold]\nmodel = \"{}\"\n[report]\nruntime_dir = \"{}\"\n",
+            "allow_untrained = true\nallow_degraded = true\n{LIMITS}[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\n{waiting}\n{models}[report]\nruntime_dir = \"{}\"\n",
             settings.prefix,
             settings.root,
-            model.display(),
             dir.display()
         );
         std::fs::write(dir.join("c.toml"), text).map_err(|cause| cause.to_string())?;
@@ -96,6 +101,14 @@ impl World {
         Some(fields.get(7)?.parse::<u64>().ok()? + fields.get(9)?.parse::<u64>().ok()?)
     }
 
+    /// What the loop's thread and all others took from the heap so far; none where nothing counts.
+    pub(crate) fn allocations(&self) -> Option<[u64; 2]> {
+        let bytes = std::fs::read(self.dir.join(COUNTS)).ok()?;
+        let (counts, _) = bytes.as_chunks::<8>();
+        let counts: [u64; 2] = [u64::from_ne_bytes(*counts.first()?), u64::from_ne_bytes(*counts.get(1)?)];
+        (counts[1] > 0).then_some(counts)
+    }
+
     pub(crate) fn stop(&mut self) -> Option<Stats> {
         // SAFETY: a signal to our own child, which was not waited for yet.
         unsafe { libc::kill(self.service.id() as i32, libc::SIGTERM) };
@@ -110,6 +123,12 @@ fn service(dir: &Path) -> Result<Child, String> {
     let log = std::fs::File::create(dir.join("log")).map_err(|cause| cause.to_string())?;
     let mut command = Command::new(&program);
     command.arg("--config").arg(dir.join("c.toml")).stderr(log);
+    if !COUNTER.is_empty() {
+        let (counter, counts) = (dir.join("allocations.so"), dir.join(COUNTS));
+        let made = std::fs::write(&counter, COUNTER).and_then(|()| std::fs::write(&counts, [0; 16]));
+        made.map_err(|cause| format!("{}: {cause}", counter.display()))?;
+        command.env("LD_PRELOAD", counter).env("RAVENPOSE_ALLOCATIONS", counts);
+    }
     command.spawn().map_err(|cause| format!("{}: {cause}; run make build", program.display()))
 }
 
@@ -121,7 +140,8 @@ impl Drop for World {
     }
 }
 
-fn remove(dir: &Path, prefix: &str) {
+/// Directory and shared memory of a link that nobody uses any more.
+pub(crate) fn remove(dir: &Path, prefix: &str) {
     let _ = std::fs::remove_dir_all(dir);
     for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
         if entry.file_name().to_string_lossy().starts_with(prefix) {
@@ -130,17 +150,80 @@ fn remove(dir: &Path, prefix: &str) {
     }
 }
 
+/// Which arms there are, and what corrects them.
+#[derive(Clone, Copy)]
+pub(crate) enum Arms {
+    /// Gold, its position by the network of the paper's size.
+    One,
+    /// Both, each so.
+    Two,
+    /// Both, position and orientation of each by the models that ship.
+    Shipped,
+}
+
+const PAPER: &str = "models/untrained.onnx";
+/// The models that ship: of the position, and of the orientation.
+pub(crate) const SHIPPED: [&str; 2] = ["models/raven2-worn.onnx", "models/raven2-worn-orientation.onnx"];
+
+impl Arms {
+    /// Tables of the configuration.
+    fn tables(self) -> Result<String, String> {
+        let model = |path: &str| {
+            let path = std::fs::canonicalize(path).map_err(|cause| format!("{path}: {cause}"))?;
+            Ok::<_, String>(format!("model = \"{}\"", path.display()))
+        };
+        let names = if matches!(self, Self::One) { &["gold"][..] } else { &["gold", "green"] };
+        let mut tables = String::new();
+        for name in names {
+            if let Self::Shipped = self {
+                let [position, orientation] = SHIPPED.map(model);
+                let _ = write!(tables, "[{name}]\n{}\n[{name}.orientation]\n{}\n", position?, orientation?);
+            } else {
+                let _ = write!(tables, "[{name}]\n{}\n", model(PAPER)?);
+            }
+        }
+        Ok(tables)
+    }
+
+    /// What is the same in all states of them.
+    fn state(self) -> Result<RavenState, String> {
+        let mut state = state(0);
+        if matches!(self, Self::Two | Self::Shipped) {
+            (state.arms, state.type_) = (3, [49; 2]);
+            let gold: [f32; 8] = std::array::from_fn(|joint| state.jpos[joint]);
+            state.jpos[8..].copy_from_slice(&gold);
+            state.jpos_d[8..].copy_from_slice(&gold);
+        }
+        if let Self::Shipped = self {
+            // One that both were trained on.
+            let loaded = ravenpose::model::load(&ModelSource::new(SHIPPED[0].into())).map_err(|error| error.to_string())?;
+            let golden = loaded.card.golden.first().ok_or_else(|| format!("{}: no golden pair", SHIPPED[0]))?;
+            (0..2).for_each(|arm| features::insert(&golden.input, arm, &mut state));
+        }
+        Ok(state)
+    }
+}
+
+/// A state of one arm, made now.
 pub(crate) fn state(sequence: u64) -> RavenState {
     let mut state = RavenState::new();
     state.arms = 1;
     state.runlevel = 3;
     state.type_ = [49, 0];
     state.dt_nsec = 1_000_000;
-    state.pos[0] = (sequence % 1000) as i32;
     state.jpos[..3].copy_from_slice(&[30.0, 90.0, 22.9]);
     state.jpos_d[..3].copy_from_slice(&[30.0, 90.0, 22.9]);
-    state.enc_vals[0] = (sequence % 1000) as i32;
     state.source_id = 1;
+    made_now(state, sequence)
+}
+
+/// The next one; its encoders have moved.
+fn made_now(mut state: RavenState, sequence: u64) -> RavenState {
+    let moved = (sequence % 16) as i32 - (state.sequence % 16) as i32;
+    for arm in 0..2 {
+        state.enc_vals[8 * arm] += moved;
+        state.pos[3 * arm] += moved;
+    }
     state.source_time_ns = now_ns();
     state.seal(sequence);
     state
@@ -169,9 +252,9 @@ impl Measured {
 const ATTEMPTS: u32 = 3;
 
 /// One service for `seconds`, with these lines in its `[loop]` table; none where it ended by itself in each attempt.
-fn measure(waiting: &str, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
+fn measure(waiting: &str, arms: Arms, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
     for _ in 0..ATTEMPTS {
-        let measured = measure_once(waiting, service_core, seconds)?;
+        let measured = measure_once(waiting, arms, service_core, seconds)?;
         if measured.is_some() {
             return Ok(measured);
         }
@@ -180,8 +263,10 @@ fn measure(waiting: &str, service_core: usize, seconds: u64) -> Result<Option<Me
     Ok(None)
 }
 
-fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
-    let mut world = World::start(waiting, service_core)?;
+fn measure_once(waiting: &str, arms: Arms, service_core: usize, seconds: u64) -> Result<Option<Measured>, String> {
+    let mut world = World::start(waiting, arms, service_core)?;
+    let mut state = arms.state()?;
+    let connected = state.connected();
     let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
     let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
     let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
@@ -190,7 +275,7 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
     let (mut answered, mut missed, mut valid) = (0_u64, 0_u64, 0_u64);
     let mut next = now_ns();
     for sequence in 1..=WARM_UP + seconds * 1000 {
-        let state = state(sequence);
+        state = made_now(state, sequence);
         let sent = now_ns();
         writer.send(&state).map_err(|error| error.to_string())?;
         // As the bridge does.
@@ -207,7 +292,8 @@ fn measure_once(waiting: &str, service_core: usize, seconds: u64) -> Result<Opti
             if let Some(pose) = answer {
                 whole.push(took);
                 answered += 1;
-                valid += u64::from(pose.arm[0].status == ArmStatus::Valid as u32);
+                let is_valid = |arm: usize| connected & (1 << arm) == 0 || pose.arm[arm].status == ArmStatus::Valid as u32;
+                valid += u64::from((0..2).all(is_valid));
             } else {
                 // As long at least.
                 whole.push(PATIENCE_NS);
@@ -318,7 +404,7 @@ pub(crate) const HOP: &str = "one hop through shared memory, half of there and b
 
 /// Measures one way of waiting for `seconds`; adds its rows to the table.
 pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {
-    let Some(mut measured) = measure(&format!("wait = \"{wait}\""), service_core, seconds)? else {
+    let Some(mut measured) = measure(&format!("wait = \"{wait}\""), Arms::One, service_core, seconds)? else {
         table.row(&format!("{wait}: not measured, the machine stopped for too long"), &[f64::NAN; 5]);
         return Ok(());
     };
@@ -328,27 +414,53 @@ pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u
     table.row("    the robot's own publish call", &row);
     for name in ["input_age", "features", "inference", "publish", "total", "input_to_output", "wakeup"] {
         if let Some(stage) = measured.stats.stages.iter().find(|stage| stage.name == name && stage.count > 0) {
-            let us = |ns: u64| ns as f64 / 1000.0;
-            table.row(&format!("    {name}"), &[us(stage.p50), us(stage.p99), us(stage.p999), us(stage.max), f64::NAN]);
+            table.row(&format!("    {name}"), &of_stage(stage));
         }
     }
     Ok(())
 }
 
-/// What polling longer and reading the weights meanwhile bring, in the default mode: each alone, both and neither, round by round.
+/// Quantiles of a stage as the service tells them, µs; misses are not its matter.
+fn of_stage(stage: &StageStats) -> [f64; 5] {
+    let us = |ns: u64| ns as f64 / 1000.0;
+    [us(stage.p50), us(stage.p99), us(stage.p999), us(stage.max), f64::NAN]
+}
+
+/// A service that is measured beside others: name, lines of its `[loop]` table, arms.
+type Setup = (&'static str, &'static str, Arms);
+
+/// What polling longer and reading the weights meanwhile bring, in the default mode: each alone, both and neither.
 pub(crate) fn means(service_core: usize, rounds: usize, seconds: u64) -> Result<Table, String> {
-    const MEANS: [(&str, &str); 4] = [
-        ("both, as by default", ""),
-        ("polling 200 us before a state is due, not 400", "spin_us = 200"),
-        ("weights not kept warm", "keep_warm = false"),
-        ("neither", "spin_us = 200\nkeep_warm = false"),
+    const MEANS: [Setup; 4] = [
+        ("both, as by default", "", Arms::One),
+        ("polling 200 us before a state is due, not 400", "spin_us = 200", Arms::One),
+        ("weights not kept warm", "keep_warm = false", Arms::One),
+        ("neither", "spin_us = 200\nkeep_warm = false", Arms::One),
     ];
-    let mut all: [Option<Measured>; 4] = Default::default();
+    let title = format!("State sent -> pose read, {rounds} x {seconds} s each");
+    side_by_side(&title, &MEANS, service_core, rounds, seconds)
+}
+
+/// What a second arm and the models that ship cost, in the default mode.
+pub(crate) fn arms(service_core: usize, rounds: usize, seconds: u64) -> Result<Table, String> {
+    const ARMS: [Setup; 3] = [
+        ("one arm, 600-500-400", "", Arms::One),
+        ("two arms, 600-500-400 each", "", Arms::Two),
+        ("two arms, both shipped models each", "", Arms::Shipped),
+    ];
+    let title = format!("State sent -> pose read by arms and models, {rounds} x {seconds} s each");
+    side_by_side(&title, &ARMS, service_core, rounds, seconds)
+}
+
+/// Round by round, each time another one first.
+fn side_by_side(title: &str, setups: &[Setup], service_core: usize, rounds: usize, seconds: u64) -> Result<Table, String> {
+    let mut all: Vec<Option<Measured>> = setups.iter().map(|_| None).collect();
     for round in 0..rounds {
-        for turn in 0..MEANS.len() {
-            let at = (turn + round) % MEANS.len();
-            let Some(mut found) = measure(MEANS[at].1, service_core, seconds)? else {
-                println!("note: {}: round {} of {rounds} not measured, the machine stopped for too long", MEANS[at].0, round + 1);
+        for turn in 0..setups.len() {
+            let at = (turn + round) % setups.len();
+            let (name, waiting, arms) = setups[at];
+            let Some(mut found) = measure(waiting, arms, service_core, seconds)? else {
+                println!("note: {name}: round {} of {rounds} not measured, the machine stopped for too long", round + 1);
                 continue;
             };
             match &mut all[at] {
@@ -360,9 +472,8 @@ pub(crate) fn means(service_core: usize, rounds: usize, seconds: u64) -> Result<
             }
         }
     }
-    let title = format!("State sent -> pose read, {rounds} x {seconds} s each");
-    let mut table = Table::new(&title, &["p50", "p99", "p99.9", "max", "missed"]);
-    for ((name, _), measured) in MEANS.iter().zip(&mut all) {
+    let mut table = Table::new(title, &["p50", "p99", "p99.9", "max", "missed"]);
+    for ((name, ..), measured) in setups.iter().zip(&mut all) {
         if let Some(measured) = measured {
             table.row(name, &measured.row());
         }

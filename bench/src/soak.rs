@@ -1,7 +1,7 @@
 //! The service for long, under load and faults: memory streamed and a disk written beside it, clients that never read, inputs that it
 //! has to refuse. What it answers is held against what it was sent.
 
-use crate::path::{PERIOD_NS, WARM_UP, World, state};
+use crate::path::{Arms, PERIOD_NS, WARM_UP, World, state};
 use crate::table::{Table, quantiles};
 use ravenpose::check;
 use ravenpose::cycle::Limits;
@@ -72,7 +72,7 @@ pub(crate) fn run(minutes: u64, load: Load, service_core: usize, priority: i32) 
 }
 
 fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -> Result<(), String> {
-    let mut world = World::start("", core)?;
+    let mut world = World::start("", Arms::One, core)?;
     let settings = world.settings.clone();
     let open = |depth| Reader::<CorrectedPose>::open(&settings, depth).map_err(|error| error.to_string());
     let _idle = (0..idle).map(|_| open(IDLE_DEPTH)).collect::<Result<Vec<_>, _>>()?;
@@ -80,11 +80,11 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
     // The service is new to the first states.
     let mut warming = Seen::default();
     send(&mut world, &link, 1..=WARM_UP, &mut warming)?;
-    let before = world.loop_faults();
+    let before = (world.loop_faults(), world.allocations());
     let mut seen = Seen { age: Vec::with_capacity((seconds * 1000) as usize), hold: warming.hold, ..Seen::default() };
     let (first, last) = (WARM_UP + 1, WARM_UP + seconds * 1000);
     send(&mut world, &link, first..=last, &mut seen)?;
-    let after = world.loop_faults();
+    let after = (world.loop_faults(), world.allocations());
     let ended = world.ended();
     let stats =
         world.stop().filter(|_| !ended).ok_or_else(|| format!("{name}: the service ended by itself: {}", world.last_words()))?;
@@ -101,8 +101,9 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
     let Seen { poses, missed, valid, refused, held, delayed, .. } = seen;
     println!(
         "{name}: {sent} states sent, {poses} poses and {missed} that this client missed; {valid} valid, {refused} of {faulty} faults answered as such, \
-         {held} raw after one, {delayed} raw for lateness; {skipped} skipped, {} came twice",
+         {held} raw after one, {delayed} raw for lateness; {skipped} skipped, {} came twice; {}",
         counter("duplicates"),
+        allocated(before.1, after.1),
     );
     let wrong = [
         (counter("lost") > 0, "states were lost"),
@@ -112,9 +113,16 @@ fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -
         (poses + missed + skipped + SLACK < sent, "states were not answered"),
         (refused + missed + skipped + delayed < faulty, "faults were not answered as such"),
         (valid * 2 < poses, "less than half of the poses were valid"),
-        (before.is_some() && before != after, "the loop's thread had page faults"),
+        (before.0.is_some() && before.0 != after.0, "the loop's thread had page faults"),
+        (before.1.is_some() && before.1.map(|all| all[0]) != after.1.map(|all| all[0]), "the loop's thread used the heap"),
     ];
     wrong.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, what)| Err(format!("{name}: {what}")))
+}
+
+/// What was taken from the heap meanwhile, in words.
+fn allocated(before: Option<[u64; 2]>, after: Option<[u64; 2]>) -> String {
+    let Some((before, after)) = before.zip(after) else { return "allocations not counted".to_owned() };
+    format!("{} allocations by the loop's thread and {} by all others", after[0] - before[0], after[1] - before[1])
 }
 
 /// Sends these states, one a millisecond, and judges every pose that comes meanwhile.

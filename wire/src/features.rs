@@ -38,7 +38,36 @@ macro_rules! layout {
             )*
             features[DT] = (f64::from(state.dt_sec) + f64::from(state.dt_nsec) * 1e-9) as f32;
         }
+
+        /// The other way: fills in what a state has of one arm (0 gold, 1 green). Whole numbers are rounded.
+        pub fn insert(features: &[f32; FEATURES], arm: usize, state: &mut RavenState) {
+            $(
+                let to = &mut state.$field.as_chunks_mut::<$count>().0[arm];
+                for (to, from) in to.iter_mut().zip(&features[$start..$start + $count]) {
+                    to.set(*from);
+                }
+            )*
+            state.dt_sec = 0;
+            state.dt_nsec = (f64::from(features[DT]) * 1e9).round() as i32;
+        }
     };
+}
+
+/// A number of a state, from a feature.
+trait Number {
+    fn set(&mut self, value: f32);
+}
+
+impl Number for f32 {
+    fn set(&mut self, value: f32) {
+        *self = value;
+    }
+}
+
+impl Number for i32 {
+    fn set(&mut self, value: f32) {
+        *self = value.round() as Self;
+    }
 }
 
 layout! {
@@ -109,5 +138,18 @@ mod tests {
         assert_eq!(features[0..3], [100.0, 101.0, 102.0]);
         assert_eq!(features[56], 500.0);
         assert_eq!(features[96], 7.0);
+    }
+
+    #[test]
+    fn what_is_inserted_is_extracted() {
+        let wanted: [f32; FEATURES] = std::array::from_fn(|feature| if feature == DT { 0.002 } else { feature as f32 - 40.0 });
+        let mut state = RavenState::new();
+        insert(&wanted, crate::GREEN, &mut state);
+        let mut found = [0.0; FEATURES];
+        extract(&state, crate::GREEN, &mut found);
+        assert_eq!(found, wanted);
+        // The other arm has nothing but the time step, which both share.
+        extract(&state, crate::GOLD, &mut found);
+        assert_eq!(found[..DT], [0.0; DT]);
     }
 }
