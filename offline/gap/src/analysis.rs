@@ -25,7 +25,9 @@ use crate::run_error::RunError;
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::split::{HELD_OUT, held_out_of, split};
 use crate::told::{cell_quantity, cell_unit};
-use crate::{builtin, channels, closed_loop, comparable, corrected, flexible, floors, known, lag, parallel, unexplained, verdicts};
+use crate::{
+    builtin, channels, closed_loop, comparable, corrected, counts, flexible, floors, known, lag, parallel, unexplained, verdicts,
+};
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -294,7 +296,9 @@ fn analyse_with(
                 from_recording |= recorded;
                 let alike = alike(&robot, &real, &sim);
                 if recorded || !alike {
-                    apart.push(sim.clone());
+                    let mut sim = sim.clone();
+                    counts::read_alike(&robot, &real, &mut sim);
+                    apart.push(sim);
                 }
                 comparable[k] = !recorded && alike;
                 if !recorded && !alike && one.sim.is_some() {
@@ -305,7 +309,8 @@ fn analyse_with(
                 if !alike && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
                     (Run { id: one.id.clone(), ..real }, None)
                 } else {
-                    let (real, sim) = common(&real, &sim)?;
+                    let (real, mut sim) = common(&real, &sim)?;
+                    counts::read_alike(&robot, &real, &mut sim);
                     (Run { id: one.id.clone(), ..real }, Some(sim))
                 }
             }

@@ -64,10 +64,13 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
                 }
                 with.effects_mut().push(effect);
             }
-            if let Some(constant) = constant_of(&before, candidate, estimate, window)
-                && !merged(&mut with, &constant, 1.0)
+            if let Some((beside, sign)) = beside(&before, candidate, estimate, window)
+                && !merged(&mut with, &beside, sign)
             {
-                with.effects_mut().push(constant);
+                if sign < 0.0 {
+                    return Err("there is less friction than none".to_owned());
+                }
+                with.effects_mut().push(beside);
             }
             // A file that could not be read again, or a simulation that runs away, would be worse than one without the effect.
             with.plant().map_err(|error| error.to_string())?;
@@ -145,7 +148,9 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
     let same = |effect: &&mut Effect| {
         effect.physics.name() == more.physics.name() && effect.bound == more.bound && always(effect) && always(more)
     };
-    let Some(at) = model.effects_mut().iter_mut().position(|mut effect| same(&mut effect)) else { return false };
+    let Some(at) = model.effects_mut().iter_mut().position(|mut effect| same(&mut effect)) else {
+        return sign < 0.0 && always(more) && taken_off_drive(model, more);
+    };
     let own = &mut model.effects_mut()[at];
     let both = match (own.physics, more.physics) {
         (Physics::CoulombFriction(a), Physics::CoulombFriction(b)) if a.asymmetry == 0.0 && b.asymmetry == 0.0 => {
@@ -193,6 +198,30 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
     true
 }
 
+/// Less of the friction that the drive itself has; false where it has not so much.
+fn taken_off_drive(model: &mut RobotModel, less: &Effect) -> bool {
+    let (Bound::Joint(joint) | Bound::Motor(joint)) = less.bound else { return false };
+    let Some(mut drive) = model.drives().get(joint).cloned() else { return false };
+    let ratio = drive.reduction.abs();
+    let (at_joint, at_motor, scale, amount) = match less.physics {
+        Physics::CoulombFriction(CoulombFriction { f_c, .. }) => {
+            (&mut drive.joint_coulomb, &mut drive.motor_coulomb_nm, ratio, f_c)
+        }
+        Physics::ViscousFriction(ViscousFriction { b }) => {
+            (&mut drive.joint_viscous, &mut drive.motor_viscous_nm_s, ratio * ratio, b)
+        }
+        _ => return false,
+    };
+    let there = *at_joint + scale * *at_motor;
+    if there <= 0.0 || amount > (1.0 + NOTHING) * there {
+        return false;
+    }
+    let left = (1.0 - amount / there).max(0.0);
+    *at_joint *= left;
+    *at_motor *= left;
+    model.set_drive(joint, &drive).is_ok()
+}
+
 /// Share of an effect by which more than all of it may seem to be gone.
 const NOTHING: f64 = 0.1;
 
@@ -214,10 +243,14 @@ fn named(found: &Found, candidate: &Candidate) -> String {
     format!("{}{at}", candidate.family.physics.replace('_', " "))
 }
 
-/// The offset of the joint that goes with a ratio or a coupling, which is right elsewhere than where the simulator has it: a ratio where
-/// the joint was homed, a coupling at zero.
-fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate, window: Window) -> Option<Effect> {
+/// What goes with an effect, and -1 where it is to be taken off: the offset of the joint with a ratio or a coupling, which is right elsewhere than
+/// where the simulator has it (a ratio where the joint was homed, a coupling at zero); what sliding friction is less, with that at rest.
+fn beside(model: &RobotModel, candidate: &Candidate, estimate: &Estimate, window: Window) -> Option<(Effect, f64)> {
     let (family, theta) = (&candidate.family, &estimate.coefficients);
+    if family.physics == "stribeck_friction" && theta[0] < 0.0 {
+        let less = Physics::CoulombFriction(CoulombFriction { f_c: -theta[0], asymmetry: 0.0 });
+        return Some((windowed(Effect::new(less, Bound::Joint(*family.joints.first()?)), window), -1.0));
+    }
     let constant = match (family.physics, family.form) {
         ("transmission_ratio", _) => {
             let home = model.drives().get(*family.joints.first()?)?.home;
@@ -232,7 +265,7 @@ fn constant_of(model: &RobotModel, candidate: &Candidate, estimate: &Estimate, w
     let physics = Physics::JointOffset(JointOffset { o: constant });
     let mut effect = windowed(Effect::new(physics, Bound::Joint(*family.joints.first()?)), window);
     effect.source = Some(format!("ravenpose gap (constant of {} {})", family.physics, family.form));
-    Some(effect)
+    Some((effect, 1.0))
 }
 
 /// The effect in a window.
@@ -333,6 +366,12 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate, window: 
             let normal = direction(azimuth, elevation);
             let _ = parameters.0.insert("n".to_owned(), Value::Vector(normal.as_slice().to_vec()));
             Bound::Robot
+        }
+        ("stribeck_friction", _) if estimate.coefficients[0] < 0.0 => {
+            // Sliding friction is less beside it.
+            let _ = parameters.0.insert("f_c".to_owned(), Value::Number(0.0));
+            let _ = parameters.0.insert("f_s".to_owned(), Value::Number(estimate.coefficients[1]));
+            at_joint()?
         }
         ("load_dependent_friction", _) => {
             let _ = parameters.0.remove("mu_theta");

@@ -44,6 +44,7 @@ mod clock;
 mod closed_loop;
 mod comparable;
 mod corrected;
+mod counts;
 mod experiment;
 mod gates;
 mod held_windows;

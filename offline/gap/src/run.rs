@@ -184,16 +184,7 @@ impl Run {
         };
         let from_motors = motor.is_some();
         let position = match &motor {
-            Some(motor) => {
-                let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
-                let mut joints = combine(&inverse, motor);
-                for (series, drive) in joints.iter_mut().zip(&robot.drives) {
-                    for q in series.iter_mut() {
-                        *q += drive.offset;
-                    }
-                }
-                joints
-            }
+            Some(motor) => joints_of(robot, motor),
             None => reported().ok_or_else(|| {
                 let lacks = |name: String| series(None, &name).is_none();
                 let lacks_both = |j: &usize| lacks(format!("mpos_{}_rad", j + 1)) && lacks(format!("jpos_{}_{}", j + 1, unit(*j)));
@@ -285,6 +276,19 @@ impl Run {
         made.alive(robot)?;
         made.bridge();
         Ok(made)
+    }
+
+    /// Places of joints and drives anew, after those of the motors changed.
+    pub(crate) fn place_by_motors(&mut self, robot: &Robot) {
+        if let Some(motor) = &self.motor {
+            self.position = joints_of(robot, motor);
+        }
+        self.place_drives(robot);
+    }
+
+    /// Places of the drives anew, after those of the joints changed.
+    pub(crate) fn place_drives(&mut self, robot: &Robot) {
+        self.drive = combine(&robot.coupling(), &self.position);
     }
 
     /// A sensor that is the same in every row while its joint moves is broken or was not recorded.
@@ -585,6 +589,17 @@ fn straighten(robot: &Robot, tip: &mut [Vec<f64>; 3], joints: &[Vec<f64>], wrist
             tip.iter_mut().zip(off).for_each(|(axis, off)| axis[i] -= off);
         }
     }
+}
+
+/// Joints as the motors say them.
+fn joints_of(robot: &Robot, motor: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = robot.joint_count();
+    let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+    let mut joints = combine(&inverse, motor);
+    for (series, drive) in joints.iter_mut().zip(&robot.drives) {
+        series.iter_mut().for_each(|q| *q += drive.offset);
+    }
+    joints
 }
 
 /// Rows of a matrix times a set of series.

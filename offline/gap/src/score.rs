@@ -381,7 +381,7 @@ pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
         Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first.abs()),
-        Bound::UpTo(times) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * own[before]),
+        Bound::UpTo(times, there) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * (there + own[before])),
     })
 }
 

@@ -21,9 +21,12 @@ const STRIBECK_EXPONENT: [f64; 2] = [1.0, 2.0];
 /// Their range in the vocabulary: how a sign turns round is known to its form only, and a free exponent makes up for that, at the cost of the
 /// force at rest.
 pub(crate) const STRIBECK_RANGE: [f64; 2] = [0.5, 2.0];
-/// Most that friction at rest exceeds sliding friction by, in terms of it: twice the vocabulary's range (f_s/f_c up to 2.5). A bristle's
+/// Most that friction at rest exceeds sliding friction by, in terms of it, with what of it the simulation has: twice the vocabulary's range (f_s/f_c up to 2.5). A bristle's
 /// curve at no speed at all fits the noise of standstills otherwise.
 const STATIC_EXCESS: f64 = 3.0;
+/// Share of the simulation's sliding friction that may be too much beside more of it at rest: a level that load or warmth makes up for fits with
+/// less than none otherwise.
+const LESS_SLIDING: f64 = 0.1;
 /// First guess of the time in which a bristle settles, s.
 const SETTLING_S: [f64; 1] = [0.004];
 /// Time constants of heating, s.
@@ -136,8 +139,9 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
         vec![d.effort_of(j, velocity(d), at_link)]
     }));
     let slow = STRIBECK_SPEED.map(|share| share * speed);
+    let sliding = least(LESS_SLIDING * coulomb);
     // On bristles too: else plain friction that rounds better would pass for it.
-    let excess = Bound::UpTo(STATIC_EXCESS);
+    let excess = Bound::UpTo(STATIC_EXCESS, if at_link { 0.0 } else { coulomb.max(0.0) });
     let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), by_speed as Turn);
     let starts = product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]);
     let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, by_travel as Turn);
@@ -145,7 +149,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     for (names, starts, sign) in [speeds, bristles] {
         let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
         all.push(
-            Family::shaped("stribeck_friction", &[j], form, TORQUE, &[positive, excess], &shape, starts, move |d, s| {
+            Family::shaped("stribeck_friction", &[j], form, TORQUE, &[sliding, excess], &shape, starts, move |d, s| {
                 let mut shape = s.to_vec();
                 shape[0] = shape[0].max(least);
                 shape[1] = shape[1].clamp(STRIBECK_RANGE[0], STRIBECK_RANGE[1]);

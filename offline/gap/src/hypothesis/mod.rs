@@ -42,8 +42,8 @@ pub enum Bound {
     Positive,
     /// Within these.
     Between(f64, f64),
-    /// Positive, and at most so many times the coefficient before.
-    UpTo(f64),
+    /// Positive, and at most so many times what the coefficient before adds to that which is there.
+    UpTo(f64, f64),
     /// At most so many times the first coefficient, of either sign.
     Within(f64),
 }

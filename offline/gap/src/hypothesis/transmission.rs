@@ -176,7 +176,7 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         vec![d.strain_of(j, d.cable_load(j))]
     }));
     // Its damper is stiff beside a softer spring: it gives way late.
-    let damped = [Bound::Positive, Bound::UpTo(DAMPED_S)];
+    let damped = [Bound::Positive, Bound::UpTo(DAMPED_S, 0.0)];
     let family = Family::fixed("cable_stretch", &[j], "linear, damped", TRANSMISSION, &damped, move |d| {
         let load = d.cable_load(j);
         vec![d.strain_of(j, load.clone()), d.strain_of(j, minus(&rate(d, &load)))]
