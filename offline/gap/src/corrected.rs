@@ -201,7 +201,7 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
 /// Less of the friction that the drive itself has; false where it has not so much.
 fn taken_off_drive(model: &mut RobotModel, less: &Effect) -> bool {
     let (Bound::Joint(joint) | Bound::Motor(joint)) = less.bound else { return false };
-    let Some(mut drive) = model.drives().get(joint).cloned() else { return false };
+    let Some(mut drive) = model.drives().get(joint).copied() else { return false };
     let ratio = drive.reduction.abs();
     let (at_joint, at_motor, scale, amount) = match less.physics {
         Physics::CoulombFriction(CoulombFriction { f_c, .. }) => {

@@ -76,7 +76,9 @@ fn round(recorded: &[Vec<f64>], simulated: &mut [Vec<f64>]) -> bool {
     let mut any = false;
     for (recorded, simulated) in recorded.iter().zip(simulated) {
         let Some(grid) = Grid::of(recorded).filter(|grid| resolution(simulated) < FINER * grid.count) else { continue };
-        simulated.iter_mut().for_each(|x| *x = grid.round(*x));
+        for x in simulated.iter_mut() {
+            *x = grid.round(*x);
+        }
         any = true;
     }
     any
@@ -87,19 +89,13 @@ pub(crate) fn read_alike(robot: &Robot, real: &Run, sim: &mut Run) {
     if real.points {
         return;
     }
-    match (&real.motor, &mut sim.motor) {
-        (Some(recorded), Some(simulated)) => {
-            if round(recorded, simulated) {
-                sim.place_by_motors(robot);
-            }
+    // Motors on one side and joints on the other are not of the same place.
+    if let (Some(recorded), Some(simulated)) = (&real.motor, &mut sim.motor) {
+        if round(recorded, simulated) {
+            sim.place_by_motors(robot);
         }
-        (None, None) => {
-            if round(&real.position, &mut sim.position) {
-                sim.place_drives(robot);
-            }
-        }
-        // Not of the same place.
-        _ => {}
+    } else if real.motor.is_none() && sim.motor.is_none() && round(&real.position, &mut sim.position) {
+        sim.place_drives(robot);
     }
     if let (Some(recorded), Some(simulated)) = (&real.truth, &mut sim.truth) {
         round(recorded, simulated);
@@ -149,7 +145,7 @@ mod tests {
         assert!(!round(&[fine], &mut simulated));
         assert_eq!(simulated[0], coarse);
         let mut smooth = [slow(0.0)];
-        assert!(round(&[coarse.clone()], &mut smooth));
+        assert!(round(std::slice::from_ref(&coarse), &mut smooth));
         assert!(smooth[0].iter().zip(&coarse).all(|(a, b)| (a - b).abs() < 1e-6), "the same encoder");
     }
 }

@@ -597,7 +597,9 @@ fn joints_of(robot: &Robot, motor: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let inverse = robot.motor_from_joint.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
     let mut joints = combine(&inverse, motor);
     for (series, drive) in joints.iter_mut().zip(&robot.drives) {
-        series.iter_mut().for_each(|q| *q += drive.offset);
+        for q in series.iter_mut() {
+            *q += drive.offset;
+        }
     }
     joints
 }
