@@ -111,8 +111,6 @@ const LIBRARY_BYTES: f64 = 24_000.0;
 const BLOCK_S: f64 = 1.5;
 /// Most blocks; of many runs two for each all the same.
 const BLOCKS: f64 = 40.0;
-/// Most effects of a table of points.
-const MOST_OF_POINTS: usize = 9;
 /// Times the noise floor that may be left of held-out runs where a robot's own numbers are taken at their word,
 const FLOOR: f64 = 2.0;
 /// or share of the removable error that has to be gone.
@@ -419,8 +417,9 @@ fn analyse_with(
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
     // Points have offset, play and coupling on every joint, and nothing else.
-    let thresholds =
-        Thresholds { effects: if problem.of_points() { MOST_OF_POINTS } else { options.thresholds.effects }, ..options.thresholds };
+    let effects =
+        if problem.of_points() { robot.joint_count().max(options.thresholds.effects) } else { options.thresholds.effects };
+    let thresholds = Thresholds { effects, ..options.thresholds };
     let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
         if options.trace {
             // Nobody may listen any more.

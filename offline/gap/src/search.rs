@@ -32,13 +32,13 @@ pub struct Thresholds {
     pub amplitude: f64,
     /// Claims whose scores differ by less than this share are equal: the likeliest one is taken, which is mostly the simplest.
     pub equal: f64,
-    /// Most effects.
+    /// Most effects, beside two for each joint: a simulation may have been made without any friction.
     pub effects: usize,
 }
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.005, effects: 4 }
+        Self { nats: 12.0, share: 0.2, amplitude: 0.25, equal: 0.005, effects: 2 }
     }
 }
 
@@ -274,7 +274,7 @@ impl Search<'_, '_> {
     /// Takes one more effect as long as one is acceptable beside those chosen.
     fn forward(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Beyond {
         let mut beyond = Beyond::default();
-        while chosen.len() < self.thresholds.effects {
+        while chosen.len() < self.thresholds.effects + 2 * self.problem.robot.joint_count() {
             let base = self.grams(chosen, None);
             let ranked = self.rank(chosen);
             ranked.iter().take(6).for_each(|scored| trace(describe(scored)));

@@ -243,13 +243,22 @@ const PLANAR: &str = r#"<robot name="planar"><link name="base"/>
 <link name="lower"><inertial><origin xyz="0.12 0 0.02"/><mass value="1.2"/><inertia ixx="0.001" iyy="0.012" izz="0.012" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="tip" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0.3 0 0"/></joint><link name="tool"/></robot>"#;
 
+/// A third one, which turns out of it.
+const HAND: &str = r#"<joint name="wrist" type="revolute"><parent link="lower"/><child link="hand"/><origin xyz="0.3 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="100" velocity="10"/></joint>
+<link name="hand"><inertial><origin xyz="0.06 0 0.02"/><mass value="0.6"/><inertia ixx="0.0005" iyy="0.003" izz="0.003" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="tip" type="fixed"><parent link="hand"/>"#;
+
 fn planar() -> RobotModel {
+    of_urdf(PLANAR)
+}
+
+fn of_urdf(text: &str) -> RobotModel {
     static MADE: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
     let number = MADE.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     let folder = std::env::temp_dir().join(format!("ravenpose-planar-{}-{number}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("folder");
     let urdf = folder.join("planar.urdf");
-    std::fs::write(&urdf, PLANAR).expect("written");
+    std::fs::write(&urdf, text).expect("written");
     let robot = RobotModel::load(urdf.to_str().expect("UTF-8")).expect("a robot");
     drop(std::fs::remove_dir_all(&folder));
     robot
@@ -296,6 +305,33 @@ fn friction_that_is_more_at_rest_is_told_beside_the_sliding_friction_that_the_si
     assert!(value("f_c").abs() < 0.1 && (value("f_s") - 0.6).abs() < 0.2, "{parameters:?}");
     let corrected = RobotModel::from_toml(outcome.corrected.as_deref().expect("a corrected model"), None).expect("it can be read");
     assert!(corrected.effects().iter().any(|effect| effect.physics.name() == "stribeck_friction"), "{corrected:?}");
+}
+
+#[test]
+fn all_friction_is_found_that_a_simulation_without_any_lacks() {
+    // Six effects: no more than four were looked for, and what the others did made those four larger.
+    const JOINTS: [(&str, f64, f64); 3] = [("rad", 0.2, 0.6), ("rad", 0.5, 0.8), ("rad", 0.1, 0.9)];
+    const FRICTION: [[f64; 2]; 3] = [[0.8, 0.6], [0.4, 0.3], [0.15, 0.1]];
+    let simulated = of_urdf(&PLANAR.replace(r#"<joint name="tip" type="fixed"><parent link="lower"/>"#, HAND));
+    let mut robot = simulated.clone();
+    for (joint, [dry, viscous]) in FRICTION.into_iter().enumerate() {
+        for (physics, name, size) in [("coulomb_friction", "f_c", dry), ("viscous_friction", "b", viscous)] {
+            let physics = Physics::new(physics, &Parameters::of(&[(name, size)])).expect("a name").expect("parameters");
+            robot.effects_mut().push(Effect::new(physics, Bound::Joint(joint)));
+        }
+    }
+    let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
+    let report = gap_beside(&simulated, &runs(&robot), &[1, 2].map(|seed| moved_along(&simulated, seed, &JOINTS))).report;
+    assert_eq!(report.status, Status::Explained, "{}", report.summary);
+    let primary: Vec<_> = report.verdicts.iter().filter(|verdict| verdict.role == Role::Primary).collect();
+    assert_eq!(primary.len(), 6, "{}", report.summary);
+    for (joint, [dry, viscous]) in ["shoulder", "elbow", "wrist"].iter().zip(FRICTION) {
+        for (name, size) in [("f_c", dry), ("b", viscous)] {
+            let at_joint = primary.iter().filter(|verdict| verdict.location.joint.iter().any(|at| at == joint));
+            let found = at_joint.flat_map(|verdict| &verdict.parameters).find(|parameter| parameter.name == name).expect(name);
+            assert!((found.value / size - 1.0).abs() < 0.08, "{joint}: {found:?}");
+        }
+    }
 }
 
 #[test]

@@ -7,11 +7,23 @@ use crate::cell::Channel;
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
-/// A sign of the motion of a joint, before or behind its cable, in one run with the numbers that round it, at every row.
-type Turn = fn(&Dictionary, usize, (usize, bool), &[f64]) -> Vec<f64>;
+/// A sign of the motion of a joint in one run with the numbers that round it, at every row.
+type Turn = fn(&Dictionary, usize, Place, &[f64]) -> Vec<f64>;
+
+/// Where friction is.
+#[derive(Clone, Copy)]
+struct Place {
+    joint: usize,
+    /// Behind the cable, or before it.
+    at_link: bool,
+    /// The largest speed over which a sign may turn there.
+    widest: f64,
+}
 
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 pub(super) const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
+/// The largest, likewise: what turns over the usual speed is viscous friction as well, and stands in the way of either.
+const SIGN_SPEED_MOST: f64 = 0.3;
 /// Least Stribeck speed over the RMS speed: a narrower curve is a spike at a standstill, whose height nothing tells.
 const STRIBECK_LEAST: f64 = 0.01;
 /// Speeds below which Stribeck friction rises, as shares of the RMS speed.
@@ -77,8 +89,8 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             if at_link { motion.velocity[j][i] } else { motion.drive_velocity[j][i] }
         })
     };
-    let place = (j, at_link);
     let speed = size(&velocity(dictionary)).max(1e-9);
+    let place = Place { joint: j, at_link, widest: SIGN_SPEED_MOST * speed };
     // What the pulleys carry: all of the cable's load, or what the links ask for in their motion, or to be held; a law is mostly written for one
     // of the latter.
     let mut loads: Vec<(&'static str, LoadOf, f64)> = vec![(form, |d, j| d.load(j), 0.0)];
@@ -167,24 +179,25 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
-fn smooth(dictionary: &Dictionary, place: (usize, bool), shape: &[f64], sign: Turn) -> Vec<f64> {
+fn smooth(dictionary: &Dictionary, place: Place, shape: &[f64], sign: Turn) -> Vec<f64> {
     dictionary.smoothed(|r| sign(dictionary, r, place, shape))
 }
 
 /// Turning round over a presliding travel; shape: that travel, and the time in which the vibration of such bristles settles
 /// (LuGre: `z + t zd`).
-fn by_travel(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64]) -> Vec<f64> {
-    dictionary.problem.pairs[run].real.bristle(j, at_link, shape[0].max(1e-12), shape[1])
+fn by_travel(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64]) -> Vec<f64> {
+    dictionary.problem.pairs[run].real.bristle(place.joint, place.at_link, shape[0].max(1e-12), shape[1])
 }
 
 /// Turning over a speed, the shape.
-fn by_speed(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64]) -> Vec<f64> {
-    dictionary.problem.pairs[run].real.quick(j, at_link).iter().map(|v| (v / shape[0]).tanh()).collect()
+fn by_speed(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64]) -> Vec<f64> {
+    let width = shape[0].min(place.widest);
+    dictionary.problem.pairs[run].real.quick(place.joint, place.at_link).iter().map(|v| (v / width).tanh()).collect()
 }
 
 /// Sign of a drive's velocity, turning over a speed, smoothed.
 pub(super) fn turning(dictionary: &Dictionary, j: usize, speed: f64) -> Vec<f64> {
-    smooth(dictionary, (j, false), &[speed], by_speed)
+    smooth(dictionary, Place { joint: j, at_link: false, widest: f64::INFINITY }, &[speed], by_speed)
 }
 
 /// The same, as steep as its noise allows.
@@ -194,9 +207,9 @@ pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
 }
 
 /// What the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, and that of the sign.
-fn stribeck(dictionary: &Dictionary, run: usize, (j, at_link): (usize, bool), shape: &[f64], sign: Turn) -> Vec<f64> {
-    let speeds = dictionary.problem.pairs[run].real.quick(j, at_link);
-    let signs = sign(dictionary, run, (j, at_link), &shape[2..]);
+fn stribeck(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64], sign: Turn) -> Vec<f64> {
+    let speeds = dictionary.problem.pairs[run].real.quick(place.joint, place.at_link);
+    let signs = sign(dictionary, run, place, &shape[2..]);
     signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 
