@@ -101,7 +101,7 @@ def recordings(folder, minutes):
 def training(folder):
     """An epoch of the paper's recipe and of the default one on the runs of `recordings`: three epochs less one, so that reading does not count."""
     for preset in ["paper", "default"]:
-        train = [BIN / "ravenpose", "train", "--data", folder / "runs", "--preset", preset, "--truth-noise", "0.5", "--seed", "1"]
+        train = [BIN / "ravenpose", "train", "--data", *sorted((folder / "runs").glob("*.mcap")), "--preset", preset, "--truth-noise", "0.5", "--seed", "1"]
         times = []
         for epochs in ["1", "3"]:
             seconds, memory = run([*train, "--epochs", epochs, "--out", folder / f"{preset}-{epochs}.onnx"])
