@@ -373,6 +373,9 @@ fn signed_ranks(values: &[f64]) -> f64 {
     sum / (n * (n + 1.0) * (2.0 * n + 1.0) / 6.0).sqrt().max(1e-300)
 }
 
+/// Share of what is there that a coefficient held against it has to be: less fits the noise of standstills.
+const OF_ALL: f64 = 0.2;
+
 /// Are the coefficients of a candidate, the last ones of a fit, what they may be?
 pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
     let own = &fit.coefficients[fit.coefficients.len() - candidate.columns.len()..];
@@ -381,7 +384,12 @@ pub fn within_bounds(candidate: &Candidate, fit: &Fit) -> bool {
         Bound::Positive => *x > 0.0,
         Bound::Between(low, high) => (*low..=*high).contains(x),
         Bound::Within(times) => own.first().is_some_and(|first| x.abs() <= times * first.abs()),
-        Bound::UpTo(times, there) => *x > 0.0 && k.checked_sub(1).is_some_and(|before| *x <= times * (there + own[before])),
+        Bound::UpTo(times, there) => {
+            let before = k.checked_sub(1).map_or(0.0, |before| own[before]);
+            let by_itself = *x <= times * before;
+            let of_all = *there > 0.0 && (OF_ALL * there..=times * (there + before)).contains(x);
+            *x > 0.0 && (by_itself || of_all)
+        }
     })
 }
 
