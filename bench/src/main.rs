@@ -39,6 +39,7 @@ const OF_TRACT_AVX2: [(Format, f64); 4] = [OF_TRACT_ANY[0], (Format::I16, 0.55),
 const OF_TRACT_ANY: [(Format, f64); 1] = [(Format::F32, 0.85)];
 
 /// What is measured.
+#[derive(Default)]
 struct Parts {
     kernel: bool,
     /// Of the kernel only the tight loop.
@@ -56,16 +57,6 @@ impl Parts {
     /// parts; `sleep`, `spin` or `event` for one way of waiting; `means` for what makes the default one fast; `arms` for what arms and models cost.
     fn wanted(full: bool, only: Option<&str>) -> Result<Self, String> {
         const WAITS: [&str; 3] = ["sleep", "spin", "event"];
-        let nothing = Self {
-            kernel: false,
-            tight_only: false,
-            growth: false,
-            memory: false,
-            stages: false,
-            means: false,
-            arms: false,
-            waits: Vec::new(),
-        };
         Ok(match only {
             None => Self {
                 kernel: true,
@@ -75,16 +66,16 @@ impl Parts {
                 means: full,
                 arms: full,
                 waits: WAITS.to_vec(),
-                ..nothing
+                ..Self::default()
             },
-            Some("tight") => Self { kernel: true, tight_only: true, ..nothing },
-            Some("kernel") => Self { kernel: true, ..nothing },
-            Some("memory") => Self { memory: true, ..nothing },
-            Some("stages") => Self { stages: true, ..nothing },
-            Some("means") => Self { means: true, ..nothing },
-            Some("arms") => Self { arms: true, ..nothing },
+            Some("tight") => Self { kernel: true, tight_only: true, ..Self::default() },
+            Some("kernel") => Self { kernel: true, ..Self::default() },
+            Some("memory") => Self { memory: true, ..Self::default() },
+            Some("stages") => Self { stages: true, ..Self::default() },
+            Some("means") => Self { means: true, ..Self::default() },
+            Some("arms") => Self { arms: true, ..Self::default() },
             Some(other) => match WAITS.into_iter().find(|wait| *wait == other) {
-                Some(wait) => Self { waits: vec![wait], ..nothing },
+                Some(wait) => Self { waits: vec![wait], ..Self::default() },
                 None => {
                     return Err(format!(
                         "RAVENPOSE_BENCH_ONLY={other} must be tight, kernel, memory, stages, means, arms, sleep, spin or event"

@@ -110,7 +110,7 @@ pub(crate) fn run(minutes: u64, only: Option<&str>, become_the_robot: fn(), core
 
 fn ask(conditions: &[Condition], minutes: u64, become_the_robot: fn(), core: usize) -> Result<Table, String> {
     let mut world = World::start("", Arms::One, core)?;
-    let settings = world.settings.clone();
+    let settings = world.settings().clone();
     let (condition, stopped) = (AtomicUsize::new(BETWEEN_BLOCKS), AtomicBool::new(false));
     let (mut seen, disturbed) = std::thread::scope(|scope| {
         let robot = scope.spawn(|| {

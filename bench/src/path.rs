@@ -24,9 +24,37 @@ const LIMITS: &str = "[limits]\nstale_us = 1000000\nbudget_us = 100000\nlate_fal
 /// States before anything is measured: connecting, warming up, becoming valid.
 pub(crate) const WARM_UP: u64 = 1_500;
 
-pub(crate) struct World {
+/// A link of this process alone; its files go with it.
+pub(crate) struct OwnLink {
     dir: PathBuf,
     pub(crate) settings: Settings,
+}
+
+impl OwnLink {
+    pub(crate) fn new(name: &str) -> Self {
+        let process = std::process::id();
+        let dir = std::env::temp_dir().join(format!("ravenpose-{name}-{process}"));
+        let settings = Settings { prefix: format!("rp{name}{process}_"), root: format!("{}/iceoryx2/", dir.display()) };
+        Self { dir, settings }
+    }
+}
+
+impl Drop for OwnLink {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.dir);
+        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&self.settings.prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+/// A service on a link of its own.
+pub(crate) struct World {
+    link: OwnLink,
+    /// Is what it takes from the heap counted?
+    counted: bool,
     service: Child,
 }
 
@@ -35,22 +63,36 @@ const COUNTER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/allocations.so"
 const COUNTS: &str = "allocations";
 
 impl World {
+    /// With these lines in its `[loop]` table.
     pub(crate) fn start(waiting: &str, arms: Arms, core: usize) -> Result<Self, String> {
-        let dir = std::env::temp_dir().join(format!("ravenpose-bench-{}", std::process::id()));
-        std::fs::create_dir_all(&dir).map_err(|cause| cause.to_string())?;
-        let settings = Settings { prefix: format!("rpbench{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
+        Self::begin(waiting, arms, core, false)
+    }
+
+    /// As by default, with one arm, and [`World::allocations`].
+    pub(crate) fn start_counted(core: usize) -> Result<Self, String> {
+        Self::begin("", Arms::One, core, true)
+    }
+
+    fn begin(waiting: &str, arms: Arms, core: usize, counted: bool) -> Result<Self, String> {
+        let link = OwnLink::new("bench");
+        let dir = &link.dir;
+        std::fs::create_dir_all(dir).map_err(|cause| cause.to_string())?;
         let models = arms.tables()?;
         let text = format!(
             "allow_untrained = true\nallow_degraded = true\n{LIMITS}[transport]\nprefix = \"{}\"\nroot = \"{}\"\n[loop]\ncore = {core}\n{waiting}\n{models}[report]\nruntime_dir = \"{}\"\n",
-            settings.prefix,
-            settings.root,
+            link.settings.prefix,
+            link.settings.root,
             dir.display()
         );
         std::fs::write(dir.join("c.toml"), text).map_err(|cause| cause.to_string())?;
-        let service = service(&dir)?;
-        let mut world = Self { dir, settings, service };
+        let service = service(dir, counted)?;
+        let mut world = Self { link, counted, service };
         world.runs()?;
         Ok(world)
+    }
+
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.link.settings
     }
 
     /// Returns when the service says that it runs.
@@ -74,12 +116,12 @@ impl World {
         }
         let killed = self.service.kill().and_then(|()| self.service.wait());
         killed.map_err(|cause| format!("ravenposed cannot be killed: {cause}"))?;
-        self.service = service(&self.dir)?;
+        self.service = service(&self.link.dir, self.counted)?;
         self.runs()
     }
 
     fn log(&self) -> String {
-        std::fs::read_to_string(self.dir.join("log")).unwrap_or_default()
+        std::fs::read_to_string(self.link.dir.join("log")).unwrap_or_default()
     }
 
     pub(crate) fn last_words(&self) -> String {
@@ -103,7 +145,7 @@ impl World {
 
     /// What the loop's thread and all others took from the heap so far; none where nothing counts.
     pub(crate) fn allocations(&self) -> Option<[u64; 2]> {
-        let bytes = std::fs::read(self.dir.join(COUNTS)).ok()?;
+        let bytes = std::fs::read(self.link.dir.join(COUNTS)).ok()?;
         let (counts, _) = bytes.as_chunks::<8>();
         let counts: [u64; 2] = [u64::from_ne_bytes(*counts.first()?), u64::from_ne_bytes(*counts.get(1)?)];
         (counts[1] > 0).then_some(counts)
@@ -113,17 +155,17 @@ impl World {
         // SAFETY: a signal to our own child, which was not waited for yet.
         unsafe { libc::kill(self.service.id() as i32, libc::SIGTERM) };
         let _ = self.service.wait();
-        serde_json::from_slice(&std::fs::read(self.dir.join("stats.json")).ok()?).ok()
+        serde_json::from_slice(&std::fs::read(self.link.dir.join("stats.json")).ok()?).ok()
     }
 }
 
-/// Starts the service of this directory's configuration.
-fn service(dir: &Path) -> Result<Child, String> {
+/// Starts the service of this directory's configuration; what counts its allocations in front of the C library, if wanted and built.
+fn service(dir: &Path, counted: bool) -> Result<Child, String> {
     let program = std::env::current_exe().map_err(|cause| cause.to_string())?.with_file_name("ravenposed");
     let log = std::fs::File::create(dir.join("log")).map_err(|cause| cause.to_string())?;
     let mut command = Command::new(&program);
     command.arg("--config").arg(dir.join("c.toml")).stderr(log);
-    if !COUNTER.is_empty() {
+    if counted && !COUNTER.is_empty() {
         let (counter, counts) = (dir.join("allocations.so"), dir.join(COUNTS));
         let made = std::fs::write(&counter, COUNTER).and_then(|()| std::fs::write(&counts, [0; 16]));
         made.map_err(|cause| format!("{}: {cause}", counter.display()))?;
@@ -136,17 +178,6 @@ impl Drop for World {
     fn drop(&mut self) {
         let _ = self.service.kill();
         let _ = self.service.wait();
-        remove(&self.dir, &self.settings.prefix);
-    }
-}
-
-/// Directory and shared memory of a link that nobody uses any more.
-pub(crate) fn remove(dir: &Path, prefix: &str) {
-    let _ = std::fs::remove_dir_all(dir);
-    for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-        if entry.file_name().to_string_lossy().starts_with(prefix) {
-            let _ = std::fs::remove_file(entry.path());
-        }
     }
 }
 
@@ -267,9 +298,9 @@ fn measure_once(waiting: &str, arms: Arms, service_core: usize, seconds: u64) ->
     let mut world = World::start(waiting, arms, service_core)?;
     let mut state = arms.state()?;
     let connected = state.connected();
-    let writer: Writer<RavenState> = Writer::open(&world.settings).map_err(|error| error.to_string())?;
-    let reader: Reader<CorrectedPose> = Reader::open(&world.settings, 1).map_err(|error| error.to_string())?;
-    let bell = Bell::open(&world.settings).map_err(|error| error.to_string())?;
+    let writer: Writer<RavenState> = Writer::open(world.settings()).map_err(|error| error.to_string())?;
+    let reader: Reader<CorrectedPose> = Reader::open(world.settings(), 1).map_err(|error| error.to_string())?;
+    let bell = Bell::open(world.settings()).map_err(|error| error.to_string())?;
     let mut whole = Vec::with_capacity((seconds * 1000) as usize);
     let mut handed_over = Vec::with_capacity((seconds * 1000) as usize);
     let (mut answered, mut missed, mut valid) = (0_u64, 0_u64, 0_u64);
@@ -324,11 +355,8 @@ const TRIP_MAX_NS: i64 = 100_000_000;
 /// Quantiles of a message's way through shared memory and nothing else, µs: half of the time from a state sent here to a pose sent back by a
 /// thread on the service's core that does nothing but that; both poll.
 pub(crate) fn hop(service_core: usize, priority: i32) -> Result<[f64; 4], String> {
-    let dir = std::env::temp_dir().join(format!("ravenpose-hop-{}", std::process::id()));
-    let settings = Settings { prefix: format!("rphop{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
-    let found = trips(&settings, service_core, priority);
-    remove(&dir, &settings.prefix);
-    found.map(|mut halves| quantiles(&mut halves))
+    let link = OwnLink::new("hop");
+    trips(&link.settings, service_core, priority).map(|mut halves| quantiles(&mut halves))
 }
 
 fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<i64>, String> {

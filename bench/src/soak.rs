@@ -1,7 +1,7 @@
 //! The service for long, under load and faults: memory streamed and a disk written beside it, clients that never read, inputs that it
 //! has to refuse. What it answers is held against what it was sent.
 
-use crate::path::{Arms, PERIOD_NS, WARM_UP, World, state};
+use crate::path::{PERIOD_NS, WARM_UP, World, state};
 use crate::table::{Table, quantiles};
 use ravenpose::check;
 use ravenpose::cycle::Limits;
@@ -72,8 +72,8 @@ pub(crate) fn run(minutes: u64, load: Load, service_core: usize, priority: i32) 
 }
 
 fn part(table: &mut Table, name: &str, seconds: u64, idle: usize, core: usize) -> Result<(), String> {
-    let mut world = World::start("", Arms::One, core)?;
-    let settings = world.settings.clone();
+    let mut world = World::start_counted(core)?;
+    let settings = world.settings().clone();
     let open = |depth| Reader::<CorrectedPose>::open(&settings, depth).map_err(|error| error.to_string());
     let _idle = (0..idle).map(|_| open(IDLE_DEPTH)).collect::<Result<Vec<_>, _>>()?;
     let link = (Writer::<RavenState>::open(&settings).map_err(|error| error.to_string())?, open(DEPTH)?);

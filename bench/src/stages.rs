@@ -1,14 +1,14 @@
 //! What a cycle does beside the network, part by part: each many times in a row, with everything in the cache and no other core near.
 
-use crate::path::SHIPPED;
+use crate::path::{OwnLink, SHIPPED};
 use crate::table::{Table, quantiles};
 use ravenpose::config::ModelSource;
-use ravenpose::correction::Estimator;
+use ravenpose::correction::{ArmModel, Estimator, Model};
 use ravenpose::cycle::{Cycle, Limits};
 use ravenpose::guard::Guard;
 use ravenpose::histogram::{STAGES, exchange};
 use ravenpose::model::{Estimate, Loaded, load};
-use ravenpose_transport::{Reader, Settings, Writer, now_ns};
+use ravenpose_transport::{Reader, Writer, now_ns};
 use ravenpose_wire::{CorrectedPose, FEATURES, RavenState, features};
 use std::hint::black_box;
 
@@ -94,7 +94,6 @@ fn followed(estimate: &mut Estimate, input: &[f32; FEATURES], now_ns: &mut i64) 
 
 /// A turn of a cycle whose estimator does nothing.
 fn a_cycle(state: &RavenState, guard: Guard) -> impl FnMut() + use<> {
-    use ravenpose::correction::{ArmModel, Model};
     let model = Model {
         estimator: Nothing,
         guard,
@@ -124,26 +123,20 @@ fn a_cycle(state: &RavenState, guard: Guard) -> impl FnMut() + use<> {
 /// To a reader of this thread, who takes each one; taking it is not in the time.
 fn publish() -> Result<[f64; 4], String> {
     let told = |error: ravenpose_transport::TransportError| error.to_string();
-    let dir = std::env::temp_dir().join(format!("ravenpose-stages-{}", std::process::id()));
-    let settings = Settings { prefix: format!("rpstages{}_", std::process::id()), root: format!("{}/iceoryx2/", dir.display()) };
-    let handed_over = || -> Result<[f64; 4], String> {
-        let writer: Writer<CorrectedPose> = Writer::open(&settings).map_err(told)?;
-        let reader: Reader<CorrectedPose> = Reader::open(&settings, 1).map_err(told)?;
-        let mut pose = CorrectedPose::new();
-        let mut all = Vec::with_capacity(BATCHES * 10);
-        for sequence in 1..=BATCHES as u64 * 10 {
-            pose.seal(sequence);
-            writer.prepare();
-            let begun = now_ns();
-            writer.send(&pose).map_err(told)?;
-            all.push(now_ns() - begun);
-            if reader.latest().map_err(told)?.is_none() {
-                return Err("a pose that was handed over did not come".to_owned());
-            }
+    let link = OwnLink::new("stages");
+    let writer: Writer<CorrectedPose> = Writer::open(&link.settings).map_err(told)?;
+    let reader: Reader<CorrectedPose> = Reader::open(&link.settings, 1).map_err(told)?;
+    let mut pose = CorrectedPose::new();
+    let mut all = Vec::with_capacity(BATCHES * 10);
+    for sequence in 1..=BATCHES as u64 * 10 {
+        pose.seal(sequence);
+        writer.prepare();
+        let begun = now_ns();
+        writer.send(&pose).map_err(told)?;
+        all.push(now_ns() - begun);
+        if reader.latest().map_err(told)?.is_none() {
+            return Err("a pose that was handed over did not come".to_owned());
         }
-        Ok(quantiles(&mut all))
-    };
-    let found = handed_over();
-    crate::path::remove(&dir, &settings.prefix);
-    found
+    }
+    Ok(quantiles(&mut all))
 }
