@@ -294,9 +294,7 @@ fn analyse_with(
                 from_recording |= recorded;
                 let alike = alike(&robot, &real, &sim);
                 if recorded || !alike {
-                    let mut sim = sim.clone();
-                    counts::read_alike(&robot, &real, &mut sim);
-                    apart.push(sim);
+                    apart.push(counts::read_alike(&robot, &real, sim.clone()));
                 }
                 comparable[k] = !recorded && alike;
                 if !recorded && !alike && one.sim.is_some() {
@@ -307,8 +305,8 @@ fn analyse_with(
                 if !alike && (real.dt_s - sim.dt_s).abs() > 0.01 * real.dt_s && sim.torque.is_some() {
                     (Run { id: one.id.clone(), ..real }, None)
                 } else {
-                    let (real, mut sim) = common(&real, &sim)?;
-                    counts::read_alike(&robot, &real, &mut sim);
+                    let (real, sim) = common(&real, &sim)?;
+                    let sim = counts::read_alike(&robot, &real, sim);
                     (Run { id: one.id.clone(), ..real }, Some(sim))
                 }
             }

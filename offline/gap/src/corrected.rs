@@ -56,21 +56,16 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         let candidate = &effect.chosen.candidate;
         let window = last_window(found, k);
         let put = |model: &RobotModel, window: Window| {
-            let (effect, sign) = as_effect(found, candidate, estimate, window)?;
             let mut with = model.clone();
-            if !merged(&mut with, &effect, sign) {
-                if sign < 0.0 {
-                    return Err::<_, String>("there is less of it than none".to_owned());
-                }
-                with.effects_mut().push(effect);
-            }
-            if let Some((beside, sign)) = beside(&before, candidate, estimate, window)
-                && !merged(&mut with, &beside, sign)
+            for (effect, sign) in
+                [as_effect(found, candidate, estimate, window)?].into_iter().chain(beside(&before, candidate, estimate, window))
             {
-                if sign < 0.0 {
-                    return Err("there is less friction than none".to_owned());
+                if !merged(&mut with, &effect, sign) {
+                    if sign < 0.0 {
+                        return Err::<_, String>("there is less of it than none".to_owned());
+                    }
+                    with.effects_mut().push(effect);
                 }
-                with.effects_mut().push(beside);
             }
             // A file that could not be read again, or a simulation that runs away, would be worse than one without the effect.
             with.plant().map_err(|error| error.to_string())?;

@@ -42,7 +42,6 @@ impl Grid {
 
     /// The grid on which all places lie, if they lie on one of nearly this count: many counts tell it better than a printed one.
     fn through(series: &[f64], count: f64) -> Option<Self> {
-        let first = *series.first()?;
         let mut number = 0.0;
         let numbers: Vec<f64> = std::iter::once(0.0)
             .chain(series.windows(2).map(|pair| {
@@ -58,7 +57,7 @@ impl Grid {
         }
         let found = Self { origin: place - middle * across / along, count: across / along };
         let lies = |x: &f64| off((x - found.origin) / found.count).abs() < NEAR;
-        ((found.count / count - 1.0).abs() < NEAR && lies(&first) && series.iter().all(lies)).then_some(found)
+        ((found.count / count - 1.0).abs() < NEAR && series.iter().all(lies)).then_some(found)
     }
 
     fn round(self, x: f64) -> f64 {
@@ -84,10 +83,10 @@ fn round(recorded: &[Vec<f64>], simulated: &mut [Vec<f64>]) -> bool {
     any
 }
 
-/// Reads a simulation through the encoders of the recording: those of the motors, or of the joints where these were recorded.
-pub(crate) fn read_alike(robot: &Robot, real: &Run, sim: &mut Run) {
+/// A simulation read through the encoders of the recording: those of the motors, or of the joints where these were recorded.
+pub(crate) fn read_alike(robot: &Robot, real: &Run, mut sim: Run) -> Run {
     if real.points {
-        return;
+        return sim;
     }
     // Motors on one side and joints on the other are not of the same place.
     if let (Some(recorded), Some(simulated)) = (&real.motor, &mut sim.motor) {
@@ -100,6 +99,7 @@ pub(crate) fn read_alike(robot: &Robot, real: &Run, sim: &mut Run) {
     if let (Some(recorded), Some(simulated)) = (&real.truth, &mut sim.truth) {
         round(recorded, simulated);
     }
+    sim
 }
 
 #[cfg(test)]

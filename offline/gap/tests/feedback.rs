@@ -25,10 +25,14 @@ fn nominal() -> RobotModel {
 }
 
 fn with(physics: &str, bound: Bound, parameters: &[(&str, f64)]) -> RobotModel {
+    and(nominal(), physics, bound, parameters)
+}
+
+/// A robot with one effect more.
+fn and(mut robot: RobotModel, physics: &str, bound: Bound, parameters: &[(&str, f64)]) -> RobotModel {
     let physics = Physics::new(physics, &Parameters::of(parameters)).expect("a name").expect("parameters");
-    let mut model = nominal();
-    model.effects_mut().push(Effect::new(physics, bound));
-    model
+    robot.effects_mut().push(Effect::new(physics, bound));
+    robot
 }
 
 /// Joints of the built-in robot: unit, middle and reach.
@@ -212,9 +216,8 @@ fn a_ripple_is_fed_back() {
 #[test]
 fn a_ratio_takes_the_place_along_where_it_is_right() {
     // Homed in the middle of its travel, 1.5 rad.
-    let mut robot = with("transmission_ratio", Bound::Joint(1), &[("e", 0.01)]);
-    let offset = Physics::new("joint_offset", &Parameters::of(&[("o", -0.015)])).expect("a name").expect("parameters");
-    robot.effects_mut().push(Effect::new(offset, Bound::Joint(1)));
+    let robot = with("transmission_ratio", Bound::Joint(1), &[("e", 0.01)]);
+    let robot = and(robot, "joint_offset", Bound::Joint(1), &[("o", -0.015)]);
     let (corrected, _) = fed_back_of(&robot, "transmission_ratio");
     let names: Vec<&str> = corrected.effects().iter().map(|effect| effect.physics.name()).collect();
     assert_eq!(names, ["transmission_ratio", "joint_offset"]);
@@ -269,11 +272,8 @@ fn nothing_is_missing_in_slow_motion_whose_places_are_in_counts() {
     // Out of counts a slow velocity stands and jumps, and with it the friction that a simulation has, which had no encoders: it was warming up, or inertia.
     const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.04), ("rad", 0.5, 0.05)];
     const COUNT: f64 = 1.6e-4;
-    let mut robot = planar();
-    for (joint, level) in [(0, 0.8), (1, 0.4)] {
-        let dry = Physics::new("coulomb_friction", &Parameters::of(&[("f_c", level)])).expect("a name").expect("parameters");
-        robot.effects_mut().push(Effect::new(dry, Bound::Joint(joint)));
-    }
+    let dry = |robot, joint, level| and(robot, "coulomb_friction", Bound::Joint(joint), &[("f_c", level)]);
+    let robot = dry(dry(planar(), 0, 0.8), 1, 0.4);
     let seen = |seed: u64| {
         let mut run = recorded_along(&robot, seed, &JOINTS);
         for column in
@@ -291,12 +291,9 @@ fn nothing_is_missing_in_slow_motion_whose_places_are_in_counts() {
 fn friction_that_is_more_at_rest_is_told_beside_the_sliding_friction_that_the_simulation_has() {
     // It was some warming up: what is more at rest was held against what slides more than in the simulation, which is nothing.
     const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.3), ("rad", 0.5, 0.4)];
-    let made = |physics: &str, parameters: &[(&str, f64)]| {
-        Effect::new(Physics::new(physics, &Parameters::of(parameters)).expect("a name").expect("parameters"), Bound::Joint(0))
-    };
-    let (mut simulated, mut robot) = (planar(), planar());
-    simulated.effects_mut().push(made("coulomb_friction", &[("f_c", 0.8)]));
-    robot.effects_mut().push(made("stribeck_friction", &[("f_c", 0.8), ("f_s", 1.4), ("v_s", 0.05), ("a", 2.0)]));
+    let simulated = and(planar(), "coulomb_friction", Bound::Joint(0), &[("f_c", 0.8)]);
+    let at_rest = [("f_c", 0.8), ("f_s", 1.4), ("v_s", 0.05), ("a", 2.0)];
+    let robot = and(planar(), "stribeck_friction", Bound::Joint(0), &at_rest);
     let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
     let outcome = gap_beside(&simulated, &runs(&robot), &runs(&simulated));
     assert_eq!(named(&outcome.report), ["stribeck_friction"], "{}", outcome.report.summary);
@@ -315,10 +312,8 @@ fn all_friction_is_found_that_a_simulation_without_any_lacks() {
     let simulated = of_urdf(&PLANAR.replace(r#"<joint name="tip" type="fixed"><parent link="lower"/>"#, HAND));
     let mut robot = simulated.clone();
     for (joint, [dry, viscous]) in FRICTION.into_iter().enumerate() {
-        for (physics, name, size) in [("coulomb_friction", "f_c", dry), ("viscous_friction", "b", viscous)] {
-            let physics = Physics::new(physics, &Parameters::of(&[(name, size)])).expect("a name").expect("parameters");
-            robot.effects_mut().push(Effect::new(physics, Bound::Joint(joint)));
-        }
+        robot = and(robot, "coulomb_friction", Bound::Joint(joint), &[("f_c", dry)]);
+        robot = and(robot, "viscous_friction", Bound::Joint(joint), &[("b", viscous)]);
     }
     let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
     let report = gap_beside(&simulated, &runs(&robot), &[1, 2].map(|seed| moved_along(&simulated, seed, &JOINTS))).report;
@@ -339,9 +334,7 @@ fn a_base_is_tilted_in_the_plane_in_which_all_joints_turn() {
     // Out of that plane a tilt shows nothing: it fitted noise by more than a tilt can be, and the whole was refused for a steady force.
     const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.7), ("rad", 0.5, 0.9)];
     let robot = planar();
-    let mut tilted = robot.clone();
-    let tilt = Physics::new("gravity_direction", &Parameters::of(&[("a", 0.0), ("b", 0.05)])).expect("a name").expect("parameters");
-    tilted.effects_mut().push(Effect::new(tilt, Bound::Robot));
+    let tilted = and(robot.clone(), "gravity_direction", Bound::Robot, &[("a", 0.0), ("b", 0.05)]);
     let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
     let outcome = gap_beside(&robot, &runs(&tilted), &runs(&robot));
     assert_eq!(named(&outcome.report), ["gravity_direction"], "{}", outcome.report.summary);

@@ -42,7 +42,8 @@ pub enum Bound {
     Positive,
     /// Within these.
     Between(f64, f64),
-    /// Positive, and at most so many times what the coefficient before adds to that which is there.
+    /// Positive, and at most so many times the coefficient before; or, if it is large enough to be held against that (a fifth), so many times what that
+    /// adds to what is there, the second number.
     UpTo(f64, f64),
     /// At most so many times the first coefficient, of either sign.
     Within(f64),
