@@ -68,13 +68,16 @@ fn refuse(message: &str) -> ExitCode {
 }
 
 fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments>, String> {
-    let mut parsed = Arguments { config: PathBuf::from("/etc/ravenpose/ravenposed.toml"), check_only: false, test_hook: None };
+    let (mut config, mut check_only, mut hook) = (None, false, None);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or(format!("{argument} wants a value; see --help"));
         match argument.as_str() {
-            "--config" => parsed.config = PathBuf::from(value()?),
-            "--check-config" => parsed.check_only = true,
-            "--test-hook" => parsed.test_hook = Some(test_hook(&value()?)?),
+            "--config" => match config.replace(PathBuf::from(value()?)) {
+                None => {}
+                Some(first) => return Err(format!("--config is given twice, first {}; leave one", first.display())),
+            },
+            "--check-config" => check_only = true,
+            "--test-hook" => hook = Some(test_hook(&value()?)?),
             "--version" => {
                 print(&format!("ravenposed {} (research software, no clinical use)", env!("CARGO_PKG_VERSION")))?;
                 return Ok(None);
@@ -86,7 +89,8 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments
             _ => return Err(format!("unknown argument {argument:?}; see --help")),
         }
     }
-    Ok(Some(parsed))
+    let config = config.unwrap_or_else(|| PathBuf::from("/etc/ravenpose/ravenposed.toml"));
+    Ok(Some(Arguments { config, check_only, test_hook: hook }))
 }
 
 fn print(text: &str) -> Result<(), String> {

@@ -518,11 +518,12 @@ fn help_and_version_say_that_this_is_research_software() {
 
 #[test]
 fn wrong_arguments_are_refused() {
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["--confg"], "unknown argument \"--confg\"; see --help"),
         (&["extra"], "unknown argument \"extra\"; see --help"),
         (&["a\nb"], "unknown argument \"a\\nb\"; see --help"),
         (&["--config"], "--config wants a value; see --help"),
+        (&["--config", "a.toml", "--config", "b.toml"], "--config is given twice, first a.toml; leave one"),
         (&["--test-hook", "1:2"], "--test-hook \"1:2\" is not AFTER:TURNS:MICROSECONDS"),
     ];
     for (arguments, expected) in cases {

@@ -140,14 +140,14 @@ impl Listener {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::own::Own;
     use std::sync::mpsc;
     use std::time::Instant;
 
     #[test]
     fn a_wait_ends_in_its_time_however_short_and_with_a_ring() {
-        let folder = std::env::temp_dir().join(format!("rp_bell_{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("folder");
-        let settings = Settings { prefix: format!("rpbell{}_", std::process::id()), root: format!("{}/", folder.display()) };
+        let link = Own::new("bell");
+        let settings = &link.0;
         let (ended, waited) = mpsc::channel();
         let (rang, all_rung) = mpsc::channel::<()>();
         let own = settings.clone();
@@ -168,12 +168,10 @@ mod tests {
         for _ in 0..8 {
             waited.recv_timeout(Duration::from_secs(20)).expect("every wait ends");
         }
-        let bell = Bell::open(&settings).expect("bell");
+        let bell = Bell::open(settings).expect("bell");
         let rings = (0..3).filter(|_| bell.ring()).count();
         drop(rang);
         assert_eq!(rings, 3);
         assert!(waiting.join().expect("the listener's thread"));
-        drop(bell);
-        std::fs::remove_dir_all(&folder).expect("removed");
     }
 }

@@ -10,6 +10,8 @@
 mod error;
 mod event;
 mod link;
+#[cfg(test)]
+mod own;
 mod room;
 mod settings;
 

@@ -468,6 +468,7 @@ impl Probe {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::own::Own;
 
     /// Bytes of the files of a prefix: their lengths, and what was taken of them.
     fn shared(prefix: &str) -> (u64, u64) {
@@ -478,28 +479,8 @@ mod tests {
             .fold((0, 0), |(length, taken), file| (length + file.len(), taken + 512 * file.blocks()))
     }
 
-    /// Files of a link of its own, gone when dropped.
-    struct Own(Settings);
-
-    impl Drop for Own {
-        fn drop(&mut self) {
-            let _ = std::fs::remove_dir_all(&self.0.root);
-            for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-                if file.file_name().to_string_lossy().starts_with(&self.0.prefix) {
-                    let _ = std::fs::remove_file(file.path());
-                }
-            }
-        }
-    }
-
-    fn own(name: &str) -> Own {
-        let name = format!("{name}{}_", std::process::id());
-        let root = std::env::temp_dir().join(format!("ravenpose-{name}"));
-        Own(Settings { prefix: name, root: format!("{}/", root.display()) })
-    }
-
     fn takes_no_more_room_than_it_asks_for<T: Message>() {
-        let own = own(&format!("room{}_", T::MAX_READERS));
+        let own = Own::new(&format!("room{}_", T::MAX_READERS));
         let settings = &own.0;
         let writer = Writer::<T>::open(settings).expect("writer");
         let (alone, taken) = shared(&settings.prefix);
@@ -527,7 +508,7 @@ mod tests {
 
     #[test]
     fn what_keeps_the_way_out_warm_is_seen_by_nobody_and_takes_no_place() {
-        let own = own("warm");
+        let own = Own::new("warm");
         let writer = Writer::<RavenState>::open(&own.0).expect("writer");
         let mut state = RavenState::new();
         for sequence in 1..=3 {

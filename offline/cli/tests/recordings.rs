@@ -387,6 +387,11 @@ fn bad_input_gets_one_line_and_nothing_is_left() {
     refused(&ravenpose(&["convert", text(&table), text(&folder.file("out.xyz"))]), &["no format has this ending"]);
     refused(&ravenpose(&["convert", text(&table), text(&table)]), &["both input and output"]);
     refused(&simulate(&folder.file("runs"), &["--run-minutes", "0"]), &["--run-minutes 0"]);
+    let runs = folder.file("runs");
+    let many = ["simulate", "--minutes", "5e6", "--seed", "1", "--out", text(&runs), "--run-minutes"];
+    for (run, said) in [("1e-4", "50000000000 runs"), ("5e6", "10000 minutes at most"), ("1e300", "from 1e-4 to 5e6")] {
+        refused(&ravenpose(&[&many[..], &[run]].concat()), &["--run-minutes", said]);
+    }
     refused(
         &ravenpose(&["simulate", "--minutes", "1", "--seed", "1", "--robot", "nowhere.toml", "--out", text(&folder.file("r"))]),
         &["nowhere.toml"],

@@ -27,12 +27,35 @@ pub(crate) struct Wish<'a> {
 
 /// A run of one control cycle at least, and no more than ten years in all.
 const MINUTES: std::ops::RangeInclusive<f64> = 1e-4..=5e6;
+/// The longest run: its commands are made before it begins.
+const RUN_MINUTES: f64 = 1e4;
+/// Most runs: each is a file.
+const RUNS: f64 = 1e5;
 
 pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
     // Without --minutes there are --commands (the parser sees to it), whose length counts.
     for (name, value) in [("--minutes", wish.minutes.unwrap_or(1.0)), ("--run-minutes", wish.run_minutes)] {
         if !MINUTES.contains(&value) {
-            return Err(format!("{name} {value}: must be a number of minutes above 0; write {name} 10"));
+            return Err(format!(
+                "{name} {value:e}: must be a number of minutes from {:e} to {:e}; write {name} 10",
+                MINUTES.start(),
+                MINUTES.end()
+            ));
+        }
+    }
+    if let Some(minutes) = wish.minutes {
+        let runs = minutes / wish.run_minutes;
+        if runs > RUNS {
+            return Err(format!(
+                "--run-minutes {}: makes {runs:.0} runs of {minutes} minutes, {RUNS} at most; write longer ones",
+                wish.run_minutes
+            ));
+        }
+        if minutes.min(wish.run_minutes) > RUN_MINUTES {
+            return Err(format!(
+                "--run-minutes {}: a run has {RUN_MINUTES} minutes at most; write --run-minutes 60",
+                wish.run_minutes
+            ));
         }
     }
     if wish.runs_per_session == Some(0) {
