@@ -91,18 +91,20 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, from));
             for _ in 0..halvings {
                 let here = best.shape[k];
-                for there in [here - step, here + step] {
+                let tried = |there: f64| {
                     // A positive number of a grid stays one.
                     if family.steps[k].is_some_and(f64::is_nan) && here > 0.0 && there <= 0.0 {
-                        continue;
+                        return None;
                     }
                     let mut shape = best.shape.clone();
                     shape[k] = there;
                     if let Some(carry) = &family.carry {
                         carry(&best.shape, &mut shape);
                     }
-                    try_one(Candidate::new(dictionary, family, &shape, best.windows.as_ref()), &mut best, &mut least, misfit);
-                }
+                    tried(Candidate::new(dictionary, family, &shape, best.windows.as_ref()), misfit)
+                };
+                let (less, more) = parallel::both(|| tried(here - step), || tried(here + step));
+                [less, more].into_iter().flatten().for_each(|one| take_better(one, &mut best, &mut least));
                 step *= 0.5;
             }
         }
@@ -126,8 +128,11 @@ pub fn edges_moved(dictionary: &Dictionary, best: &mut Candidate, least: &mut f6
             for sign in [-1.0, 1.0] {
                 let Some(moved) = best.windows.as_ref().map(|windows| windows.moved((place, edge), sign * step)) else { return };
                 let there = moved.all()[place];
-                if there[0] < there[1] && there[edge] > 0.0 {
-                    try_one(whole.within(dictionary.problem, &moved), best, least, misfit);
+                if there[0] < there[1]
+                    && there[edge] > 0.0
+                    && let Some(one) = tried(whole.within(dictionary.problem, &moved), misfit)
+                {
+                    take_better(one, best, least);
                 }
             }
             step *= 0.5;
@@ -135,12 +140,14 @@ pub fn edges_moved(dictionary: &Dictionary, best: &mut Candidate, least: &mut f6
     }
 }
 
-fn try_one(candidate: Candidate, best: &mut Candidate, least: &mut f64, misfit: &dyn Fn(&Candidate) -> f64) {
-    if candidate.shows() {
-        let value = misfit(&candidate);
-        if value < *least {
-            (*best, *least) = (candidate, value);
-        }
+/// A candidate with its misfit; none where it shows nowhere.
+fn tried(candidate: Candidate, misfit: &dyn Fn(&Candidate) -> f64) -> Option<(Candidate, f64)> {
+    candidate.shows().then(|| misfit(&candidate)).map(|value| (candidate, value))
+}
+
+fn take_better((candidate, value): (Candidate, f64), best: &mut Candidate, least: &mut f64) {
+    if value < *least {
+        (*best, *least) = (candidate, value);
     }
 }
 

@@ -443,11 +443,10 @@ pub fn segments(problem: &Problem, cell: usize) -> Vec<Range<usize>> {
     let rows = &problem.cells[cell].rows;
     let mut all = Vec::new();
     let mut start = 0;
-    for k in 1..=rows.len() {
-        if k == rows.len() || rows[k].0 != rows[start].0 {
-            all.push(start..k);
-            start = k;
-        }
+    while let Some((run, _)) = rows.get(start) {
+        let end = start + rows[start..].partition_point(|row| row.0 == *run);
+        all.push(start..end);
+        start = end;
     }
     all
 }

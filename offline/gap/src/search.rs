@@ -488,6 +488,7 @@ impl Search<'_, '_> {
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
         claims.extend(self.refined_often_in_windows(grams, &base, &claims));
+        claims.extend(self.bent_where_a_memory_is(grams, &base, &claims));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         let mut claims = distinct(&claims);

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use arm::serial::{PARAMETERS, SerialArm, Workspace};
 use nalgebra::DMatrix;
 
+use super::signs::Signs;
 use super::windows::Windows;
 use crate::cell::Channel;
 use crate::motion::{Motion, State};
@@ -93,6 +94,10 @@ pub struct Dictionary<'a> {
     pub tip_rows: Vec<(usize, usize)>,
     /// Share of a strain of each drive's cable (column) that each joint sees.
     strain_shares: DMatrix<f64>,
+    /// Row of the grid that is nearest to each of the tip's.
+    tip_places: Vec<usize>,
+    cable_loads: Vec<OnceLock<Vec<f64>>>,
+    pub(super) signs: Signs,
     regressor: OnceLock<Vec<Vec<f64>>>,
     links: OnceLock<[Vec<Vec<f64>>; 2]>,
 }
@@ -120,7 +125,18 @@ impl<'a> Dictionary<'a> {
             })
             .collect();
         let strain_shares = problem.robot.strain_shares();
-        Self { problem, grid, tip_jacobian, tip_rows, strain_shares, regressor: OnceLock::new(), links: OnceLock::new() }
+        Self {
+            problem,
+            grid,
+            tip_jacobian,
+            tip_places: places(problem, &tip_rows),
+            tip_rows,
+            strain_shares,
+            cable_loads: vec![OnceLock::new(); n],
+            signs: Signs::default(),
+            regressor: OnceLock::new(),
+            links: OnceLock::new(),
+        }
     }
 
     /// The arm's regressor at every grid row, N×10N row-major.
@@ -249,8 +265,10 @@ impl<'a> Dictionary<'a> {
     }
 
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
-    pub fn cable_load(&self, drive: usize) -> Vec<f64> {
-        self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].link) + self.problem.shaking[r].borne(drive, k))
+    pub fn cable_load(&self, drive: usize) -> &[f64] {
+        self.cable_loads[drive].get_or_init(|| {
+            self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].link) + self.problem.shaking[r].borne(drive, k))
+        })
     }
 
     /// What a drive has to give in all but dry friction, at the grid.
@@ -265,13 +283,7 @@ impl<'a> Dictionary<'a> {
 
     /// Values of the grid carried over to the tip's rows: those of the nearest row.
     pub fn to_tip(&self, grid: &[f64]) -> Vec<f64> {
-        let mut start = Vec::with_capacity(self.problem.pairs.len());
-        let mut next = 0;
-        for pair in self.problem.pairs {
-            start.push(next);
-            next += pair.real.rows.len();
-        }
-        self.tip_rows.iter().map(|&(r, i)| grid[start[r] + nearest(&self.problem.pairs[r].real.rows, i)]).collect()
+        self.tip_places.iter().map(|place| grid[*place]).collect()
     }
 
     /// Torques that the joints need in addition, one series per joint (none: no torque). Those of the links also load the
@@ -380,6 +392,17 @@ pub(super) fn minus(a: &[f64]) -> Vec<f64> {
 /// Root of the mean square of a series.
 pub(super) fn size(series: &[f64]) -> f64 {
     crate::series::rms(series.iter().copied())
+}
+
+/// Of each row of the tip, the grid's row that is nearest to it.
+fn places(problem: &Problem, tip_rows: &[(usize, usize)]) -> Vec<usize> {
+    let mut start = Vec::with_capacity(problem.pairs.len());
+    let mut next = 0;
+    for pair in problem.pairs {
+        start.push(next);
+        next += pair.real.rows.len();
+    }
+    tip_rows.iter().map(|&(r, i)| start[r] + nearest(&problem.pairs[r].real.rows, i)).collect()
 }
 
 /// Place of the row nearest to a sample; rows are missing where the recording has holes.

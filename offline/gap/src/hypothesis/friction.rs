@@ -1,25 +1,15 @@
 //! Friction on the motor's or the link's side, and friction that fades with heat.
 
+use std::sync::Arc;
+
 use super::dictionary::{Dictionary, size, times};
+use super::signs::{Place, Turn, samples, smooth};
 use super::{Bound, Family, Valley, product};
 use crate::cell::Channel;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
 const PRESLIDING: [f64; 3] = [0.0005, 0.003, 0.015];
-/// A sign of the motion of a joint in one run with the numbers that round it, at every row.
-type Turn = fn(&Dictionary, usize, Place, &[f64]) -> Vec<f64>;
-
-/// Where friction is.
-#[derive(Clone, Copy)]
-struct Place {
-    joint: usize,
-    /// Behind the cable, or before it.
-    at_link: bool,
-    /// The largest speed over which a sign may turn there.
-    widest: f64,
-}
-
 /// Speeds over which the sign of the velocity turns, as shares of the RMS speed.
 pub(super) const SIGN_SPEED: [f64; 3] = [0.003, 0.02, 0.1];
 /// The largest, likewise: what turns over the usual speed is viscous friction as well, and stands in the way of either.
@@ -106,8 +96,8 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     };
     let positive = Bound::Positive;
     let slowest = SIGN_SPEED.map(|share| share * speed);
-    let speeds = (&[("v_eps", true)][..], product(&[&slowest]), by_speed as Turn);
-    let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), by_travel as Turn);
+    let speeds = (&[("v_eps", true)][..], product(&[&slowest]), Turn::BySpeed);
+    let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), Turn::ByTravel);
     let heated = product(&[&HEATING_S, &BEFORE_S]);
     // No more can fade than there is.
     let coulomb = dictionary.problem.nominal.drives[j][2];
@@ -115,17 +105,17 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     // Nor can the robot have less friction than none: of what the simulation has at this place, all may be too much.
     let least = |there: f64| if there > 0.0 && !at_link { Bound::Between(-there, f64::INFINITY) } else { positive };
     let (level, per_speed) = (least(coulomb), least(dictionary.problem.nominal.drives[j][1]));
-    for (names, starts, sign) in [speeds, bristles] {
+    for (names, starts, turn) in [speeds, bristles] {
         all.push(Family::shaped("coulomb_friction", &[j], form, TORQUE, &[level], names, starts.clone(), move |d, s| {
-            vec![d.effort_of(j, smooth(d, place, s, sign), at_link)]
+            vec![d.effort_of(j, smooth(d, place, s, turn).to_vec(), at_link)]
         }));
         for &(form, of, more) in &loads {
-            let alone = move |d: &Dictionary, s: &[f64]| vec![by_load(d, &smooth(d, place, s, sign), of)];
+            let alone = move |d: &Dictionary, s: &[f64]| vec![by_load(d, &smooth(d, place, s, turn), of)];
             let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive], names, starts.clone(), alone);
             all.push(family.penalised(1.0 + more));
             let with_level = move |d: &Dictionary, s: &[f64]| {
-                let sign = smooth(d, place, s, sign);
-                vec![by_load(d, &sign, of), d.effort_of(j, sign, at_link)]
+                let sign = smooth(d, place, s, turn);
+                vec![by_load(d, &sign, of), d.effort_of(j, sign.to_vec(), at_link)]
             };
             let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive, positive], names, starts.clone(), with_level);
             all.push(family.penalised(3.0 + more));
@@ -140,7 +130,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
                     &[fades],
                     &[&[("T", true), (BEFORE, true)], names].concat(),
                     heated.iter().flat_map(|heat| starts.iter().map(move |s| [heat, &s[..]].concat())).collect(),
-                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], sign)), false)],
+                    move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], turn)), false)],
                 )
                 .lying_in(Valley::Long)
                 .penalised(2.0),
@@ -154,19 +144,20 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     let sliding = least(LESS_SLIDING * coulomb);
     // On bristles too: else plain friction that rounds better would pass for it.
     let excess = Bound::UpTo(STATIC_EXCESS, if at_link { 0.0 } else { coulomb.max(0.0) });
-    let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), by_speed as Turn);
+    let speeds = (&["v_s", "a", "v_eps"][..], product(&[&slow, &STRIBECK_EXPONENT, &slowest[..1]]), Turn::BySpeed);
     let starts = product(&[&slow, &STRIBECK_EXPONENT, &travels[..1], &SETTLING_S]);
-    let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, by_travel as Turn);
+    let bristles = (&["v_s", "a", "presliding", "settling"][..], starts, Turn::ByTravel);
     let least = STRIBECK_LEAST * speed;
-    for (names, starts, sign) in [speeds, bristles] {
+    for (names, starts, turn) in [speeds, bristles] {
         let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
         all.push(
             Family::shaped("stribeck_friction", &[j], form, TORQUE, &[sliding, excess], &shape, starts, move |d, s| {
                 let mut shape = s.to_vec();
                 shape[0] = shape[0].max(least);
                 shape[1] = shape[1].clamp(STRIBECK_RANGE[0], STRIBECK_RANGE[1]);
-                let extra = d.smoothed(|r| stribeck(d, r, place, &shape, sign));
-                vec![d.effort_of(j, smooth(d, place, &s[2..], sign), at_link), d.effort_of(j, extra, at_link)]
+                let signs = samples(d, place, &s[2..], turn);
+                let extra = d.smoothed(|r| stribeck(&signs[r], d.problem.pairs[r].real.quick(j, at_link), &shape));
+                vec![d.effort_of(j, smooth(d, place, &s[2..], turn).to_vec(), at_link), d.effort_of(j, extra, at_link)]
             })
             .penalised(3.0),
         );
@@ -179,37 +170,19 @@ fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     PRESLIDING.iter().map(|share| share * travel).collect()
 }
 
-fn smooth(dictionary: &Dictionary, place: Place, shape: &[f64], sign: Turn) -> Vec<f64> {
-    dictionary.smoothed(|r| sign(dictionary, r, place, shape))
-}
-
-/// Turning round over a presliding travel; shape: that travel, and the time in which the vibration of such bristles settles
-/// (LuGre: `z + t zd`).
-fn by_travel(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64]) -> Vec<f64> {
-    dictionary.problem.pairs[run].real.bristle(place.joint, place.at_link, shape[0].max(1e-12), shape[1])
-}
-
-/// Turning over a speed, the shape.
-fn by_speed(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64]) -> Vec<f64> {
-    let width = shape[0].min(place.widest);
-    dictionary.problem.pairs[run].real.quick(place.joint, place.at_link).iter().map(|v| (v / width).tanh()).collect()
-}
-
 /// Sign of a drive's velocity, turning over a speed, smoothed.
-pub(super) fn turning(dictionary: &Dictionary, j: usize, speed: f64) -> Vec<f64> {
-    smooth(dictionary, Place { joint: j, at_link: false, widest: f64::INFINITY }, &[speed], by_speed)
+pub(super) fn turning(dictionary: &Dictionary, j: usize, speed: f64) -> Arc<Vec<f64>> {
+    smooth(dictionary, Place { joint: j, at_link: false, widest: f64::INFINITY }, &[speed], Turn::BySpeed)
 }
 
 /// The same, as steep as its noise allows.
-pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Vec<f64> {
+pub(super) fn steep(dictionary: &Dictionary, j: usize) -> Arc<Vec<f64>> {
     let speed = dictionary.problem.pairs.iter().map(|pair| pair.real.sign_speed(j)).fold(0.0, f64::max);
     turning(dictionary, j, speed)
 }
 
-/// What the Stribeck curve adds per unit of `f_s - f_c`; shape `v_s`, `a`, and that of the sign.
-fn stribeck(dictionary: &Dictionary, run: usize, place: Place, shape: &[f64], sign: Turn) -> Vec<f64> {
-    let speeds = dictionary.problem.pairs[run].real.quick(place.joint, place.at_link);
-    let signs = sign(dictionary, run, place, &shape[2..]);
+/// What the Stribeck curve adds per unit of `f_s - f_c`, of the signs of some speeds; shape `v_s`, `a`.
+fn stribeck(signs: &[f64], speeds: &[f64], shape: &[f64]) -> Vec<f64> {
     signs.iter().zip(speeds).map(|(sign, v)| sign * (-(v.abs() / shape[0]).powf(shape[1])).exp()).collect()
 }
 

@@ -8,6 +8,7 @@ mod gravity;
 mod hysteresis;
 mod inertial;
 mod kinematic;
+mod signs;
 mod timing;
 mod transmission;
 mod unknown;
@@ -277,7 +278,12 @@ impl Family {
 
     /// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant.
     pub fn may_have_edges(&self) -> bool {
-        self.form != STEPS_IN_TIME && !HARDENING.contains(&self.form)
+        self.form != STEPS_IN_TIME && !self.is_hardening()
+    }
+
+    /// Is it a spring that is bent, its numbers those of a load alone?
+    pub(crate) fn is_hardening(&self) -> bool {
+        HARDENING.contains(&self.form)
     }
 
     /// Less likely than its rivals by so much, before any data.

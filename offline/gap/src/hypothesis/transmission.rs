@@ -80,7 +80,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         move |d, s| vec![d.strain_of(j, lag(d, s[0], &|run| run.drive_and_past(j)))],
     ));
     // Where no load is known, hysteresis follows the motion: play of many widths, one beside the other.
-    if size(&dictionary.cable_load(j)) < 1e-9 {
+    if size(dictionary.cable_load(j)) < 1e-9 {
         let widths = WIDTHS.map(|share| share * travel);
         let family = Family::fixed(
             "cable_hysteresis",
@@ -98,7 +98,7 @@ fn push_play(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         );
         all.push(family.about_a_constant().penalised(3.0));
     }
-    let usual = size(&dictionary.cable_load(j)).max(1e-9);
+    let usual = size(dictionary.cable_load(j)).max(1e-9);
     // A damped link takes its time from one side to the other: the impulse of its load that carries it across is the shape.
     let impulses = CARRIED_S.map(|time| time * usual);
     let carried = Family::shaped(
@@ -135,7 +135,7 @@ fn carried(dictionary: &Dictionary, j: usize, impulse: f64) -> Vec<f64> {
     let load = dictionary.cable_load(j);
     let mut out: Vec<f64> = Vec::with_capacity(load.len());
     let mut before: Option<(usize, f64, f64)> = None;
-    for (&(r, i, _), now) in dictionary.grid.iter().zip(&load) {
+    for (&(r, i, _), now) in dictionary.grid.iter().zip(load) {
         let time_s = dictionary.problem.pairs[r].real.run.elapsed_s(i);
         let place = match before.filter(|(run, ..)| *run == r) {
             // Where a run begins it has come to rest.
@@ -168,18 +168,18 @@ fn lag(dictionary: &Dictionary, width: f64, moves: &dyn Fn(&Run) -> [&[f64]; 2])
 }
 
 fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
-    let usual = size(&dictionary.cable_load(j));
+    let usual = size(dictionary.cable_load(j));
     if usual < 1e-9 {
         return;
     }
     all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
-        vec![d.strain_of(j, d.cable_load(j))]
+        vec![d.strain_of(j, d.cable_load(j).to_vec())]
     }));
     // Its damper is stiff beside a softer spring: it gives way late.
     let damped = [Bound::Positive, Bound::UpTo(DAMPED_S, 0.0)];
     let family = Family::fixed("cable_stretch", &[j], "linear, damped", TRANSMISSION, &damped, move |d| {
         let load = d.cable_load(j);
-        vec![d.strain_of(j, load.clone()), d.strain_of(j, minus(&rate(d, &load)))]
+        vec![d.strain_of(j, load.to_vec()), d.strain_of(j, minus(&rate(d, load)))]
     });
     all.push(family.penalised(1.0));
     hysteresis::push(dictionary, j, usual, all);
@@ -263,7 +263,7 @@ fn crept(dictionary: &Dictionary, j: usize, time_s: f64, settled: f64) -> Vec<f6
 
 /// What is left of a load like the usual one that a cable bore before the start of a run; nothing in the rest of a run.
 fn left_of_before(dictionary: &Dictionary, j: usize, time_s: f64) -> Vec<f64> {
-    let usual = size(&dictionary.cable_load(j));
+    let usual = size(dictionary.cable_load(j));
     dictionary.at_grid(|r, i, _| {
         let run = &dictionary.problem.pairs[r].real.run;
         if run.since_s > 0.0 { 0.0 } else { usual * (-run.elapsed_s(i) / time_s).exp() }
@@ -475,7 +475,7 @@ fn push_coupling(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         all.push(
             Family::fixed("joint_coupling", &pair, "position and torque", TRANSMISSION, &[small], move |d| {
                 // m = (A + c) q, so tau_q = Aᵀ tau_m gains c times the other motor's torque, and less is asked of this one and of its cable.
-                let less = d.effort_of(i, minus(&d.cable_load(j)), true);
+                let less = d.effort_of(i, minus(d.cable_load(j)), true);
                 let way =
                     |motion: &Motion, k: usize| [&motion.position, &motion.velocity, &motion.acceleration].map(|set| -set[i][k]);
                 vec![coupled(d).and(less).and(d.moved_otherwise(|joint| d.strain_share(joint, j), way))]

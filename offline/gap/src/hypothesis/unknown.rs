@@ -93,7 +93,7 @@ fn push_cable(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
         };
         let load = d.cable_load(j);
         let column = |series: Vec<f64>| d.strain_of(j, series);
-        vec![column(load.iter().map(less).collect()), column(load)]
+        vec![column(load.iter().map(less).collect()), column(load.to_vec())]
     };
     let family = Family::shaped(
         UNMODELLED,

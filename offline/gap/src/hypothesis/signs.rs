@@ -1,0 +1,124 @@
+//! Signs of the motion of joints, as friction turns round with it. The last ones are kept: most laws of friction are tried with the same.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::dictionary::Dictionary;
+use crate::motion::Motion;
+
+/// Where friction is.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub joint: usize,
+    /// Behind the cable, or before it.
+    pub at_link: bool,
+    /// The largest speed over which a sign may turn there.
+    pub widest: f64,
+}
+
+/// How a sign turns round.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) enum Turn {
+    /// Over a speed, the shape.
+    BySpeed,
+    /// Over a presliding travel; shape: that travel, and the time in which the vibration of such bristles settles (LuGre: `z + t zd`).
+    ByTravel,
+}
+
+/// Which sign it is: joint, side, and what rounds it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Key(usize, bool, Turn, [f64; 2]);
+
+impl Key {
+    fn new(place: Place, turn: Turn, shape: &[f64]) -> Self {
+        let rounded = match turn {
+            Turn::BySpeed => [shape[0].min(place.widest), 0.0],
+            Turn::ByTravel => [shape[0].max(1e-12), shape[1]],
+        };
+        Self(place.joint, place.at_link, turn, rounded)
+    }
+
+    /// At every sample of a motion.
+    fn of(self, motion: &Motion) -> Vec<f64> {
+        let Self(joint, at_link, turn, [over, settling_s]) = self;
+        match turn {
+            Turn::BySpeed => motion.quick(joint, at_link).iter().map(|v| (v / over).tanh()).collect(),
+            Turn::ByTravel => motion.bristle(joint, at_link, over, settling_s),
+        }
+    }
+}
+
+/// The signs that were asked for last.
+pub(super) struct Signs {
+    smooth: Recent<Vec<f64>>,
+    samples: Recent<Vec<Vec<f64>>>,
+}
+
+impl Default for Signs {
+    fn default() -> Self {
+        // The latter are as long as the recording, and of use to what is refined at the moment only.
+        Self { smooth: Recent::new(32), samples: Recent::new(2) }
+    }
+}
+
+/// A sign smoothed as everything is, at the grid.
+pub(super) fn smooth(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<f64>> {
+    let key = Key::new(place, turn, shape);
+    dictionary.signs.smooth.get(key, || dictionary.smoothed(|r| key.of(&dictionary.problem.pairs[r].real)))
+}
+
+/// The same at every sample of each run.
+pub(super) fn samples(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<Vec<f64>>> {
+    let key = Key::new(place, turn, shape);
+    let pairs = dictionary.problem.pairs;
+    dictionary.signs.samples.get(key, || pairs.iter().map(|pair| key.of(&pair.real)).collect())
+}
+
+/// What was made last, so many of them at most.
+struct Recent<T> {
+    most: usize,
+    held: Mutex<VecDeque<(Key, Arc<T>)>>,
+}
+
+impl<T> Recent<T> {
+    fn new(most: usize) -> Self {
+        Self { most, held: Mutex::new(VecDeque::new()) }
+    }
+
+    /// The one of a key, made if it is not there: by whoever asks, so that nobody waits while it is made.
+    fn get(&self, key: Key, make: impl FnOnce() -> T) -> Arc<T> {
+        let held = || self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        let there = held().iter().find(|(other, _)| *other == key).map(|(_, value)| value.clone());
+        there.unwrap_or_else(|| {
+            let made = Arc::new(make());
+            let mut held = held();
+            held.truncate(self.most - 1);
+            held.push_front((key, made.clone()));
+            made
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_ones_are_kept_and_the_others_made_again() {
+        let recent = Recent::new(2);
+        let key = |speed: f64| Key(0, false, Turn::BySpeed, [speed, 0.0]);
+        let asked = |speed: f64| {
+            let mut made = false;
+            let value = recent.get(key(speed), || {
+                made = true;
+                speed
+            });
+            assert_eq!(*value, speed);
+            made
+        };
+        assert_eq!(
+            [asked(1.0), asked(2.0), asked(1.0), asked(3.0), asked(2.0), asked(1.0)],
+            [true, true, false, true, false, true]
+        );
+    }
+}
