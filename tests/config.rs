@@ -523,7 +523,7 @@ fn wrong_arguments_are_refused() {
         (&["extra"], "unknown argument \"extra\"; see --help"),
         (&["a\nb"], "unknown argument \"a\\nb\"; see --help"),
         (&["--config"], "--config wants a value; see --help"),
-        (&["--config", "a.toml", "--config", "b.toml"], "--config is given twice, first a.toml; leave one"),
+        (&["--config", "a.toml", "--config", "b.toml"], "--config is given twice, first \"a.toml\"; leave one"),
         (&["--test-hook", "1:2"], "--test-hook \"1:2\" is not AFTER:TURNS:MICROSECONDS"),
     ];
     for (arguments, expected) in cases {

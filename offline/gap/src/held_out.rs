@@ -6,7 +6,7 @@ use crate::held_windows;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
 use crate::problem::Problem;
-use crate::search::{Answer, Effect, Scored, Thresholds};
+use crate::search::{Answer, Effect, Scored, Thresholds, confused};
 use crate::series::{less_means, mean};
 use crate::told::main_cell;
 
@@ -158,6 +158,9 @@ impl HeldOut<'_> {
         anew: bool,
     ) -> Option<Fate> {
         let rival = || self.rival(answer, all, k, thresholds);
+        if let Some(level) = level_of_a_curve(answer, estimates, k) {
+            return Some(Fate::Otherwise(level));
+        }
         // Points have offset, play and coupling on every joint.
         if !self.problem.of_points() && is_needless(answer, estimates, k) {
             if let Some(plainer) = plainer(answer, k) {
@@ -333,6 +336,27 @@ fn plainer(answer: &Answer, k: usize) -> Option<usize> {
     };
     let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
     effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| own.is_by_load_and_level())
+}
+
+/// The rival that a Stribeck curve is which says nothing of slow motion: one as narrow as may be, whose height is that of standstills, or whose
+/// interval of friction at rest holds that of sliding. The latter then has to be as good.
+fn level_of_a_curve(answer: &Answer, estimates: &[Estimate], k: usize) -> Option<usize> {
+    let effect = &answer.effects[k];
+    let own = &effect.chosen;
+    let least = if own.candidate.is_a_spike() {
+        NEAR * own.score
+    } else if estimates[k].is_a_level() {
+        own.score - confused(own.score)
+    } else {
+        return None;
+    };
+    let joints = &own.candidate.family.joints;
+    let is_it = |rival: &Scored| {
+        let family = &rival.candidate.family;
+        let is_there = || answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
+        family.physics == "coulomb_friction" && family.joints == *joints && rival.score >= least && !is_there()
+    };
+    effect.rivals.iter().position(is_it)
 }
 
 /// Does a memory gain far more than is asked, say more than every other physics in its place, and depend on the way? Held-out runs without it

@@ -37,6 +37,12 @@ impl Estimate {
         told.peek().is_some() && told.all(|holds| holds)
     }
 
+    /// Does the interval of friction at rest hold that of sliding?
+    pub(crate) fn is_a_level(&self) -> bool {
+        let of = |name: &str| self.parameters.iter().find(|(named, _)| named.name == name);
+        of("f_s").zip(of("f_c")).is_some_and(|((_, [least, most]), (f_c, _))| (*least..=*most).contains(&f_c.value))
+    }
+
     /// Intervals that hold another estimate's as well, of the numbers that both have.
     fn widen(&mut self, other: &Self) {
         let hold = |own: &mut [f64; 2], other: &[f64; 2]| *own = [own[0].min(other[0]), own[1].max(other[1])];

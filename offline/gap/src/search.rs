@@ -8,7 +8,7 @@ mod otherwise;
 mod settle;
 
 use explained::explained;
-pub(crate) use likeliest::{complexity, likelihood, score_scale};
+pub(crate) use likeliest::{complexity, confused, likelihood, score_scale};
 use likeliest::{likeliest_first, simpler_is_enough};
 
 use crate::cell::Channel;
@@ -52,6 +52,10 @@ const EXPLAINED_OFTEN: f64 = 3.0;
 /// few coefficients and nothing else is said,
 const SURE: f64 = 36.0;
 const FEW: usize = 2;
+/// Share of the remaining squared error that no model's error explains, and of the least amplitude what is enough then: what a wrong form leaves,
+/// another one explains in part.
+const NEARLY_ALL: f64 = 0.9;
+const LESS_THEN: f64 = 0.4;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Share of what an effect explains that may be where the nominal model is wrong by far more, if it begins or ends on the way: in the opened
@@ -419,7 +423,12 @@ impl Search<'_, '_> {
             && (is_met_often(&judged.gain) || seldom || short)
             && judged.amplitude >= 0.0
             && !judged.of_the_model
-            && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.thresholds.amplitude))
+            && (alone || (judged.share >= self.thresholds.share && judged.amplitude >= self.least_amplitude(judged)))
+    }
+
+    /// Of the largest effect's amplitude, what a further one has to have.
+    fn least_amplitude(&self, judged: &Judged) -> f64 {
+        if judged.share >= NEARLY_ALL { LESS_THEN * self.thresholds.amplitude } else { self.thresholds.amplitude }
     }
 
     /// Shapes of all that was chosen, one after the other, beside the rest.
@@ -488,6 +497,7 @@ impl Search<'_, '_> {
         sort(&mut claims);
         claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
         claims.extend(self.refined_often_in_windows(grams, &base, &claims));
+        claims.retain(|s| !rest(s));
         claims.extend(self.bent_where_a_memory_is(grams, &base, &claims));
         claims.retain(|s| !rest(s));
         sort(&mut claims);

@@ -36,26 +36,20 @@ pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
     // Without --minutes there are --commands (the parser sees to it), whose length counts.
     for (name, value) in [("--minutes", wish.minutes.unwrap_or(1.0)), ("--run-minutes", wish.run_minutes)] {
         if !MINUTES.contains(&value) {
-            return Err(format!(
-                "{name} {value:e}: must be a number of minutes from {:e} to {:e}; write {name} 10",
-                MINUTES.start(),
-                MINUTES.end()
-            ));
+            let [least, most] = [MINUTES.start(), MINUTES.end()];
+            return Err(format!("{name} {value}: must be a number of minutes from {least} to {most}; write {name} 10"));
         }
     }
     if let Some(minutes) = wish.minutes {
-        let runs = minutes / wish.run_minutes;
+        let (name, length) = ("--run-minutes", wish.run_minutes);
+        let runs = (minutes / length).ceil();
         if runs > RUNS {
             return Err(format!(
-                "--run-minutes {}: makes {runs:.0} runs of {minutes} minutes, {RUNS} at most; write longer ones",
-                wish.run_minutes
+                "{name} {length}: cuts {minutes} minutes into {runs} runs, {RUNS} are the most; write longer ones"
             ));
         }
-        if minutes.min(wish.run_minutes) > RUN_MINUTES {
-            return Err(format!(
-                "--run-minutes {}: a run has {RUN_MINUTES} minutes at most; write --run-minutes 60",
-                wish.run_minutes
-            ));
+        if minutes.min(length) > RUN_MINUTES {
+            return Err(format!("{name} {length}: a run has {RUN_MINUTES} minutes at most; write {name} 60"));
         }
     }
     if wish.runs_per_session == Some(0) {

@@ -43,6 +43,7 @@ const BEFORE_MOST: f64 = 0.5;
 pub(super) const BEFORE: &str = "before";
 
 const BY_LOAD: &str = "load_dependent_friction";
+const STRIBECK: &str = "stribeck_friction";
 /// Forms of friction before a cable, and behind it: for any load, that of the links alone, and their weight.
 pub(crate) const AT_MOTOR: [&str; 3] = ["motor side", "motor side, by its links", "motor side, by their weight"];
 const AT_LINK: [&str; 3] = ["link side", "link side, by its links", "link side, by their weight"];
@@ -151,7 +152,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     for (names, starts, turn) in [speeds, bristles] {
         let shape: Vec<(&'static str, bool)> = names.iter().map(|name| (*name, true)).collect();
         all.push(
-            Family::shaped("stribeck_friction", &[j], form, TORQUE, &[sliding, excess], &shape, starts, move |d, s| {
+            Family::shaped(STRIBECK, &[j], form, TORQUE, &[sliding, excess], &shape, starts, move |d, s| {
                 let mut shape = s.to_vec();
                 shape[0] = shape[0].max(least);
                 shape[1] = shape[1].clamp(STRIBECK_RANGE[0], STRIBECK_RANGE[1]);
@@ -162,6 +163,16 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             .penalised(3.0),
         );
     }
+}
+
+/// Times the least Stribeck speed up to which a curve is as narrow as one may be.
+const NARROWEST: f64 = 1.1;
+
+/// Is a shape a Stribeck curve as narrow as one may be?
+pub(super) fn is_a_spike(family: &Family, shape: &[f64]) -> bool {
+    let slowest = |family: &Family| family.grid.iter().map(|start| start[0]).fold(f64::INFINITY, f64::min);
+    let least = || STRIBECK_LEAST / STRIBECK_SPEED[0] * slowest(family);
+    family.physics == STRIBECK && shape[0] <= NARROWEST * least()
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.

@@ -276,7 +276,8 @@ impl Family {
         !ALL_THE_TIME.contains(&self.physics) && self.may_have_edges()
     }
 
-    /// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant.
+    /// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant (it is tried in
+    /// the windows of a memory alone).
     pub fn may_have_edges(&self) -> bool {
         self.form != STEPS_IN_TIME && !self.is_hardening()
     }
@@ -428,6 +429,11 @@ impl Candidate {
     /// Is it hysteresis whose numbers say that nothing depends on the way?
     pub(crate) fn is_a_bent_spring(&self) -> bool {
         hysteresis::is_a_bent_spring(&self.family, &self.shape)
+    }
+
+    /// Is it a Stribeck curve as narrow as one may be?
+    pub(crate) fn is_a_spike(&self) -> bool {
+        friction::is_a_spike(&self.family, &self.shape)
     }
 
     /// Is it friction by load with a level of dry friction beside?

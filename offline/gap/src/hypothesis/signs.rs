@@ -1,4 +1,4 @@
-//! Signs of the motion of joints, as friction turns round with it. The last ones are kept: most laws of friction are tried with the same.
+//! Signs of the motion of joints, as friction turns round with it. What was made last is kept: most laws of friction are tried with the same.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -48,7 +48,7 @@ impl Key {
     }
 }
 
-/// The signs that were asked for last.
+/// The signs that were made last.
 pub(super) struct Signs {
     smooth: Recent<Vec<f64>>,
     samples: Recent<Vec<Vec<f64>>>,
@@ -92,6 +92,8 @@ impl<T> Recent<T> {
         there.unwrap_or_else(|| {
             let made = Arc::new(make());
             let mut held = held();
+            // Another thread may have made it meanwhile.
+            held.retain(|(other, _)| *other != key);
             held.truncate(self.most - 1);
             held.push_front((key, made.clone()));
             made

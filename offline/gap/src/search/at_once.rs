@@ -1,6 +1,6 @@
 //! Shapes whose numbers are refined all at once: those of a memory depend on each other.
 
-use super::{Scored, Search, keep_better, simpler_is_enough};
+use super::{CLOSE, Scored, Search, keep_better, simpler_is_enough};
 use crate::hypothesis::{Candidate, Column, Windows};
 use crate::intervals::slopes_of;
 use crate::parallel;
@@ -109,18 +109,30 @@ impl Search<'_, '_> {
         tried.iter().flat_map(found).collect()
     }
 
-    /// Springs that are bent, where the best claim is a memory that comes or goes: its many numbers bend it as one, and there alone it is held against
-    /// them.
+    /// Springs that are bent, where a memory comes or goes that is about as good as the best claim: its many numbers bend it as one, and there alone
+    /// it is held against them.
     pub(super) fn bent_where_a_memory_is(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
-        let Some(best) = claims.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else { return Vec::new() };
-        let (family, windows) = (&best.candidate.family, best.candidate.windows.as_ref());
-        let Some(windows) = windows.filter(|_| !family.limits.is_empty()) else { return Vec::new() };
-        let of_its_joint = self.candidates.iter().filter(|c| c.family.is_hardening() && c.family.joints == family.joints);
-        let there = of_its_joint.map(|c| c.within(self.problem, windows)).filter(Candidate::shows);
-        let mut forms: Vec<Scored> = Vec::new();
-        for scored in there.filter_map(|candidate| self.score(grams, base, &candidate)) {
-            keep_better(&mut forms, &scored, Candidate::same_form, |s| s.score);
+        let best = claims.iter().map(|s| s.score).fold(self.thresholds.nats, f64::max);
+        let mut memories: Vec<&Scored> = Vec::new();
+        for memory in claims.iter().filter(|s| !s.candidate.family.limits.is_empty() && s.score >= CLOSE * best) {
+            let own = &memory.candidate;
+            let tried =
+                memories.iter().any(|m| m.candidate.windows == own.windows && m.candidate.family.joints == own.family.joints);
+            if own.windows.is_some() && !tried {
+                memories.push(memory);
+            }
         }
+        let bent = |memory: &Scored| {
+            let (joints, windows) = (&memory.candidate.family.joints, memory.candidate.windows.as_ref());
+            let of_its_joint = self.candidates.iter().filter(|c| c.family.is_hardening() && c.family.joints == *joints);
+            let there = of_its_joint.filter_map(|c| Some(c.within(self.problem, windows?))).filter(Candidate::shows);
+            let mut forms: Vec<Scored> = Vec::new();
+            for scored in there.filter_map(|candidate| self.score(grams, base, &candidate)) {
+                keep_better(&mut forms, &scored, Candidate::same_form, |s| s.score);
+            }
+            forms
+        };
+        let mut forms: Vec<Scored> = memories.into_iter().flat_map(bent).collect();
         let _ = parallel::map(&mut forms, |scored| self.settle_shape(grams, base, scored));
         forms
     }

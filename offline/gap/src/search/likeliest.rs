@@ -87,6 +87,11 @@ pub(crate) fn score_scale(best: f64) -> f64 {
     (0.01 * best).max(2.0)
 }
 
+/// What a claim may be behind the best and is confused with it, nats.
+pub(crate) fn confused(best: f64) -> f64 {
+    (0.01 * best).max(3.0)
+}
+
 /// Logarithm of how likely a claim of some score is beside another that fits so many numbers less.
 pub(crate) fn likelihood(score: f64, beside: f64, more: f64) -> f64 {
     (score - beside) / score_scale(beside) - PER_NUMBER * more
