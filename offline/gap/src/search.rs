@@ -52,9 +52,10 @@ const EXPLAINED_OFTEN: f64 = 3.0;
 /// few coefficients and nothing else is said,
 const SURE: f64 = 36.0;
 const FEW: usize = 2;
-/// Share of the remaining squared error that no model's error explains, and of the least amplitude what is enough then: what a wrong form leaves,
-/// another one explains in part.
+/// Share of the remaining squared error that no model's error explains, if every block says so (standard errors of what is explained), and of the
+/// least amplitude what is enough then: what a wrong form leaves, another one explains in part, or in some blocks.
 const NEARLY_ALL: f64 = 0.9;
+const EVERYWHERE: f64 = 6.0;
 const LESS_THEN: f64 = 0.4;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
@@ -428,7 +429,8 @@ impl Search<'_, '_> {
 
     /// Of the largest effect's amplitude, what a further one has to have.
     fn least_amplitude(&self, judged: &Judged) -> f64 {
-        if judged.share >= NEARLY_ALL { LESS_THEN * self.thresholds.amplitude } else { self.thresholds.amplitude }
+        let surely = judged.share >= NEARLY_ALL && judged.gain.explained >= EVERYWHERE;
+        if surely { LESS_THEN * self.thresholds.amplitude } else { self.thresholds.amplitude }
     }
 
     /// Shapes of all that was chosen, one after the other, beside the rest.

@@ -68,13 +68,36 @@ fn recorded(robot: &RobotModel, seed: u64) -> Recording {
 
 /// What it does, without sensors.
 fn moved_along(robot: &RobotModel, seed: u64, joints: &[(&str, f64, f64)]) -> Recording {
-    let run = Run::from_recording(&commands(seed, joints), robot).expect("commands");
+    followed(robot, &commands(seed, joints), &format!("run {seed}"))
+}
+
+fn followed(robot: &RobotModel, commands: &Recording, name: &str) -> Recording {
+    let run = Run::from_recording(commands, robot).expect("commands");
     let options = ClosedLoop { settle_s: 1.0, ..ClosedLoop::default() };
-    closed_loop(robot, &run, options).expect("a run").to_recording(&format!("run {seed}"), robot)
+    closed_loop(robot, &run, options).expect("a run").to_recording(name, robot)
 }
 
 fn recorded_along(robot: &RobotModel, seed: u64, joints: &[(&str, f64, f64)]) -> Recording {
-    let mut out = moved_along(robot, seed, joints);
+    sensed(moved_along(robot, seed, joints), seed)
+}
+
+/// The same of moves of a second and a half with rests of half a second between them.
+fn moved_and_rested(robot: &RobotModel, seed: u64, joints: &[(&str, f64, f64)]) -> Recording {
+    let mut along = commands(seed, joints);
+    for column in along.columns.iter_mut().filter(|column| column.name != "t_s") {
+        let at = |i: usize| {
+            let (move_number, t) = (i / 2000, ((i % 2000) as f64 / 1500.0).min(1.0));
+            let [from, to] = [move_number, move_number + 1].map(|k| column.values[(2000 * k).min(column.values.len() - 1)]);
+            // Least jerk (Flash and Hogan, 1985).
+            from + (to - from) * t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t)
+        };
+        column.values = (0..column.values.len()).map(at).collect();
+    }
+    sensed(followed(robot, &along, &format!("run {seed}")), seed)
+}
+
+/// What its sensors see of what it did.
+fn sensed(mut out: Recording, seed: u64) -> Recording {
     let mut random = Random::new(seed, 2);
     for column in &mut out.columns {
         let rms = (column.values.iter().map(|x| x * x).sum::<f64>() / column.values.len() as f64).sqrt();
@@ -302,6 +325,32 @@ fn friction_that_is_more_at_rest_is_told_beside_the_sliding_friction_that_the_si
     assert!(value("f_c").abs() < 0.1 && (value("f_s") - 0.6).abs() < 0.2, "{parameters:?}");
     let corrected = RobotModel::from_toml(outcome.corrected.as_deref().expect("a corrected model"), None).expect("it can be read");
     assert!(corrected.effects().iter().any(|effect| effect.physics.name() == "stribeck_friction"), "{corrected:?}");
+}
+
+#[test]
+fn dry_friction_that_holds_at_rest_is_no_curve_and_stands_beside_a_motors_scale() {
+    // Of moves with rests between them: the spike of a Stribeck curve fitted the standstills; and what friction is beside a weaker motor was too small to be told.
+    const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.5), ("rad", 0.5, 0.6)];
+    let with = |level| and(planar(), "coulomb_friction", Bound::Joint(0), &[("f_c", level)]);
+    let moves = |robot: &RobotModel| [1, 2].map(|seed| moved_and_rested(robot, seed, &JOINTS));
+    let (simulated, stiffer) = (with(0.8), with(1.2));
+    let weaker = and(stiffer.clone(), "motor_torque_scale", Bound::Joint(0), &[("kappa", 0.85)]);
+    for (robot, names, sizes) in [
+        (stiffer, &["coulomb_friction"][..], &[("f_c", 0.4)][..]),
+        (weaker, &["motor_torque_scale", "coulomb_friction"], &[("kappa", 0.85)]),
+    ] {
+        let report = gap_beside(&simulated, &moves(&robot), &moves(&simulated)).report;
+        assert_eq!(named(&report), names, "{}", report.summary);
+        for (name, size) in sizes {
+            let found = report
+                .verdicts
+                .iter()
+                .flat_map(|verdict| &verdict.parameters)
+                .find(|parameter| parameter.name == *name)
+                .expect(name);
+            assert!((found.value / size - 1.0).abs() < 0.05, "{found:?}");
+        }
+    }
 }
 
 #[test]
