@@ -6,7 +6,7 @@ use crate::held_windows;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
 use crate::problem::Problem;
-use crate::search::{Answer, Effect, Scored, Thresholds, confused};
+use crate::search::{AHEAD, Answer, Effect, Scored, Thresholds, confused};
 use crate::series::{less_means, mean};
 use crate::told::main_cell;
 
@@ -17,8 +17,6 @@ const HOLDS: f64 = -0.2;
 /// in most of what they are fitted to.
 const HOLDS_BARELY: f64 = 0.0;
 const BARELY: f64 = 3.0;
-/// By so many times what is asked of an effect a memory has to be ahead of every other physics, if it is in no run that was held out.
-const AHEAD: f64 = 2.0;
 /// Times the noise that an effect has to be large where it is, if it is in no run that was held out.
 const STANDS_OUT: f64 = 1.0;
 /// What a rival has to leave less there to be taken instead, and the share of the claim's score that it has to have.

@@ -136,6 +136,9 @@ fn possible(physics: &str, form: &str, name: &str) -> [f64; 2] {
     }
 }
 
+/// Of friction at rest, what sliding friction counts for at least.
+const OF_AT_REST: f64 = 0.1;
+
 /// How far a parameter is from no effect; of a direction, the whole of it.
 fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
     match (physics, named.name) {
@@ -143,6 +146,11 @@ fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
         ("gravity_direction" | "frame_misalignment", _) => {
             let own = || beside(physics, named, all);
             rms(own().map(|one| one.value)) * (own().count() as f64).sqrt()
+        }
+        // Of sliding friction that is about what the simulation has, the friction at rest is what is known by a share.
+        ("stribeck_friction", "f_c") => {
+            let at_rest = all.iter().find(|one| one.name == "f_s").map_or(0.0, |f_s| f_s.value);
+            named.value.abs().max(OF_AT_REST * at_rest.abs())
         }
         // Where a phase is counted from says nothing: what it is on the average.
         _ if named.is_phase() => std::f64::consts::FRAC_PI_2,

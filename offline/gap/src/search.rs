@@ -96,6 +96,9 @@ const JUDGED: usize = 5;
 /// The first claims that may be the first effect, where others are looked for.
 const FIRSTS: usize = 8;
 
+/// By so many times what is asked of an effect a memory has to be ahead of every other physics, if nothing else speaks for it.
+pub(crate) const AHEAD: f64 = 2.0;
+
 /// Claims are close whose score is this share of the best, and as many are looked at again.
 const CLOSE: f64 = 0.9;
 const MOST_CLOSE: usize = 5;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::dictionary::{Dictionary, size, times};
-use super::signs::{Place, Turn, samples, smooth};
+use super::signs::{Place, Sign, Turn};
 use super::{Bound, Family, Valley, product};
 use crate::cell::Channel;
 
@@ -179,6 +179,18 @@ pub(super) fn is_a_spike(family: &Family, shape: &[f64]) -> bool {
 fn presliding(dictionary: &Dictionary, j: usize) -> Vec<f64> {
     let travel = dictionary.travel(j);
     PRESLIDING.iter().map(|share| share * travel).collect()
+}
+
+/// A sign smoothed as everything is, at the grid.
+fn smooth(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<f64>> {
+    let sign = Sign::new(place, turn, shape);
+    dictionary.signs.smooth.get(sign, || dictionary.smoothed(|r| sign.of(&dictionary.problem.pairs[r].real)))
+}
+
+/// The same at every sample of each run.
+fn samples(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<Vec<f64>>> {
+    let sign = Sign::new(place, turn, shape);
+    dictionary.signs.samples.get(sign, || dictionary.problem.pairs.iter().map(|pair| sign.of(&pair.real)).collect())
 }
 
 /// Sign of a drive's velocity, turning over a speed, smoothed.

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::dictionary::Dictionary;
 use crate::motion::Motion;
 
 /// Where friction is.
@@ -27,10 +26,11 @@ pub(super) enum Turn {
 
 /// Which sign it is: joint, side, and what rounds it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-struct Key(usize, bool, Turn, [f64; 2]);
+pub(super) struct Sign(usize, bool, Turn, [f64; 2]);
 
-impl Key {
-    fn new(place: Place, turn: Turn, shape: &[f64]) -> Self {
+impl Sign {
+    /// Of a place, turning so, with the numbers that round it.
+    pub(super) fn new(place: Place, turn: Turn, shape: &[f64]) -> Self {
         let rounded = match turn {
             Turn::BySpeed => [shape[0].min(place.widest), 0.0],
             Turn::ByTravel => [shape[0].max(1e-12), shape[1]],
@@ -39,7 +39,7 @@ impl Key {
     }
 
     /// At every sample of a motion.
-    fn of(self, motion: &Motion) -> Vec<f64> {
+    pub(super) fn of(self, motion: &Motion) -> Vec<f64> {
         let Self(joint, at_link, turn, [over, settling_s]) = self;
         match turn {
             Turn::BySpeed => motion.quick(joint, at_link).iter().map(|v| (v / over).tanh()).collect(),
@@ -50,8 +50,10 @@ impl Key {
 
 /// The signs that were made last.
 pub(super) struct Signs {
-    smooth: Recent<Vec<f64>>,
-    samples: Recent<Vec<Vec<f64>>>,
+    /// Smoothed as everything is, at the grid.
+    pub smooth: Recent<Vec<f64>>,
+    /// At every sample of each run.
+    pub samples: Recent<Vec<Vec<f64>>>,
 }
 
 impl Default for Signs {
@@ -61,23 +63,10 @@ impl Default for Signs {
     }
 }
 
-/// A sign smoothed as everything is, at the grid.
-pub(super) fn smooth(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<f64>> {
-    let key = Key::new(place, turn, shape);
-    dictionary.signs.smooth.get(key, || dictionary.smoothed(|r| key.of(&dictionary.problem.pairs[r].real)))
-}
-
-/// The same at every sample of each run.
-pub(super) fn samples(dictionary: &Dictionary, place: Place, shape: &[f64], turn: Turn) -> Arc<Vec<Vec<f64>>> {
-    let key = Key::new(place, turn, shape);
-    let pairs = dictionary.problem.pairs;
-    dictionary.signs.samples.get(key, || pairs.iter().map(|pair| key.of(&pair.real)).collect())
-}
-
 /// What was made last, so many of them at most.
-struct Recent<T> {
+pub(super) struct Recent<T> {
     most: usize,
-    held: Mutex<VecDeque<(Key, Arc<T>)>>,
+    held: Mutex<VecDeque<(Sign, Arc<T>)>>,
 }
 
 impl<T> Recent<T> {
@@ -85,17 +74,17 @@ impl<T> Recent<T> {
         Self { most, held: Mutex::new(VecDeque::new()) }
     }
 
-    /// The one of a key, made if it is not there: by whoever asks, so that nobody waits while it is made.
-    fn get(&self, key: Key, make: impl FnOnce() -> T) -> Arc<T> {
+    /// That of a sign, made if it is not there: by whoever asks, so that nobody waits while it is made.
+    pub(super) fn get(&self, sign: Sign, make: impl FnOnce() -> T) -> Arc<T> {
         let held = || self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        let there = held().iter().find(|(other, _)| *other == key).map(|(_, value)| value.clone());
+        let there = held().iter().find(|(other, _)| *other == sign).map(|(_, value)| value.clone());
         there.unwrap_or_else(|| {
             let made = Arc::new(make());
             let mut held = held();
             // Another thread may have made it meanwhile.
-            held.retain(|(other, _)| *other != key);
+            held.retain(|(other, _)| *other != sign);
             held.truncate(self.most - 1);
-            held.push_front((key, made.clone()));
+            held.push_front((sign, made.clone()));
             made
         })
     }
@@ -108,10 +97,10 @@ mod tests {
     #[test]
     fn the_last_ones_are_kept_and_the_others_made_again() {
         let recent = Recent::new(2);
-        let key = |speed: f64| Key(0, false, Turn::BySpeed, [speed, 0.0]);
+        let sign = |speed: f64| Sign(0, false, Turn::BySpeed, [speed, 0.0]);
         let asked = |speed: f64| {
             let mut made = false;
-            let value = recent.get(key(speed), || {
+            let value = recent.get(sign(speed), || {
                 made = true;
                 speed
             });

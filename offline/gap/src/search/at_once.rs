@@ -1,6 +1,6 @@
 //! Shapes whose numbers are refined all at once: those of a memory depend on each other.
 
-use super::{CLOSE, Scored, Search, keep_better, simpler_is_enough};
+use super::{AHEAD, Scored, Search, keep_better, simpler_is_enough};
 use crate::hypothesis::{Candidate, Column, Windows};
 use crate::intervals::slopes_of;
 use crate::parallel;
@@ -109,30 +109,21 @@ impl Search<'_, '_> {
         tried.iter().flat_map(found).collect()
     }
 
-    /// Springs that are bent, where a memory comes or goes that is about as good as the best claim: its many numbers bend it as one, and there alone
-    /// it is held against them.
+    /// Springs that are bent, where a memory comes or goes that is ahead of every other physics: its many numbers bend it as one, and there alone it is
+    /// held against them.
     pub(super) fn bent_where_a_memory_is(&self, grams: &Grams, base: &Fit, claims: &[Scored]) -> Vec<Scored> {
-        let best = claims.iter().map(|s| s.score).fold(self.thresholds.nats, f64::max);
-        let mut memories: Vec<&Scored> = Vec::new();
-        for memory in claims.iter().filter(|s| !s.candidate.family.limits.is_empty() && s.score >= CLOSE * best) {
-            let own = &memory.candidate;
-            let tried =
-                memories.iter().any(|m| m.candidate.windows == own.windows && m.candidate.family.joints == own.family.joints);
-            if own.windows.is_some() && !tried {
-                memories.push(memory);
-            }
+        let is_memory = |s: &&Scored| !s.candidate.family.limits.is_empty();
+        let next = claims.iter().filter(|s| !is_memory(s)).map(|s| s.score).fold(0.0, f64::max);
+        let best = claims.iter().filter(is_memory).max_by(|a, b| a.score.total_cmp(&b.score));
+        let Some(memory) = best.filter(|s| s.score - next >= AHEAD * self.thresholds.nats) else { return Vec::new() };
+        let joints = &memory.candidate.family.joints;
+        let Some(windows) = memory.candidate.windows.as_ref() else { return Vec::new() };
+        let of_its_joint = self.candidates.iter().filter(|c| c.family.is_hardening() && c.family.joints == *joints);
+        let there = of_its_joint.map(|c| c.within(self.problem, windows)).filter(Candidate::shows);
+        let mut forms: Vec<Scored> = Vec::new();
+        for scored in there.filter_map(|candidate| self.score(grams, base, &candidate)) {
+            keep_better(&mut forms, &scored, Candidate::same_form, |s| s.score);
         }
-        let bent = |memory: &Scored| {
-            let (joints, windows) = (&memory.candidate.family.joints, memory.candidate.windows.as_ref());
-            let of_its_joint = self.candidates.iter().filter(|c| c.family.is_hardening() && c.family.joints == *joints);
-            let there = of_its_joint.filter_map(|c| Some(c.within(self.problem, windows?))).filter(Candidate::shows);
-            let mut forms: Vec<Scored> = Vec::new();
-            for scored in there.filter_map(|candidate| self.score(grams, base, &candidate)) {
-                keep_better(&mut forms, &scored, Candidate::same_form, |s| s.score);
-            }
-            forms
-        };
-        let mut forms: Vec<Scored> = memories.into_iter().flat_map(bent).collect();
         let _ = parallel::map(&mut forms, |scored| self.settle_shape(grams, base, scored));
         forms
     }
