@@ -137,7 +137,7 @@ fn possible(physics: &str, form: &str, name: &str) -> [f64; 2] {
 }
 
 /// Of friction at rest, what sliding friction counts for at least.
-const OF_AT_REST: f64 = 0.1;
+const OF_AT_REST: f64 = 0.3;
 
 /// How far a parameter is from no effect; of a direction, the whole of it.
 fn size(physics: &str, named: &Named, all: &[Named]) -> f64 {
