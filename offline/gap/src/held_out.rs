@@ -326,35 +326,32 @@ fn is_large(answer: &Answer, k: usize) -> bool {
 
 /// The rival that an effect is where its own number is nothing: friction by load and a level is the level.
 fn plainer(answer: &Answer, k: usize) -> Option<usize> {
-    let effect = &answer.effects[k];
-    let own = &effect.chosen.candidate;
-    let is_its_level = |rival: &Scored| {
-        let family = &rival.candidate.family;
-        family.physics == "coulomb_friction" && family.joints == own.family.joints && rival.score >= NEAR * effect.chosen.score
-    };
-    let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
-    effect.rivals.iter().position(|rival| is_its_level(rival) && !is_there(rival)).filter(|_| own.is_by_load_and_level())
+    let own = &answer.effects[k].chosen;
+    if own.candidate.is_by_load_and_level() { level(answer, k, NEAR * own.score) } else { None }
 }
 
 /// The rival that a Stribeck curve is which says nothing of slow motion: one as narrow as may be, whose height is that of standstills, or whose
 /// interval of friction at rest holds that of sliding. The latter then has to be as good.
 fn level_of_a_curve(answer: &Answer, estimates: &[Estimate], k: usize) -> Option<usize> {
-    let effect = &answer.effects[k];
-    let own = &effect.chosen;
-    let least = if own.candidate.is_a_spike() {
-        NEAR * own.score
+    let own = &answer.effects[k].chosen;
+    if own.candidate.is_a_spike() {
+        level(answer, k, NEAR * own.score)
     } else if estimates[k].is_a_level() {
-        own.score - confused(own.score)
+        level(answer, k, own.score - confused(own.score))
     } else {
-        return None;
-    };
-    let joints = &own.candidate.family.joints;
-    let is_it = |rival: &Scored| {
+        None
+    }
+}
+
+/// Plain dry friction of an effect's joint among its rivals, of this score at least, if it is not said besides.
+fn level(answer: &Answer, k: usize, least: f64) -> Option<usize> {
+    let effect = &answer.effects[k];
+    let joints = &effect.chosen.candidate.family.joints;
+    let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
+    effect.rivals.iter().position(|rival| {
         let family = &rival.candidate.family;
-        let is_there = || answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
-        family.physics == "coulomb_friction" && family.joints == *joints && rival.score >= least && !is_there()
-    };
-    effect.rivals.iter().position(is_it)
+        family.physics == "coulomb_friction" && family.joints == *joints && rival.score >= least && !is_there(rival)
+    })
 }
 
 /// Does a memory gain far more than is asked, say more than every other physics in its place, and depend on the way? Held-out runs without it

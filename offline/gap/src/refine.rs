@@ -91,7 +91,7 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
             let mut step = family.steps[k].filter(|step| step.is_finite()).unwrap_or_else(|| 0.5 * spacing(family, k, from));
             for _ in 0..halvings {
                 let here = best.shape[k];
-                let tried = |there: f64| {
+                let with = |there: f64| {
                     // A positive number of a grid stays one.
                     if family.steps[k].is_some_and(f64::is_nan) && here > 0.0 && there <= 0.0 {
                         return None;
@@ -103,7 +103,7 @@ fn settled(dictionary: &Dictionary, start: &Candidate, fitted: &Fitted) -> Candi
                     }
                     tried(Candidate::new(dictionary, family, &shape, best.windows.as_ref()), misfit)
                 };
-                let (less, more) = parallel::both(|| tried(here - step), || tried(here + step));
+                let (less, more) = parallel::both(|| with(here - step), || with(here + step));
                 [less, more].into_iter().flatten().for_each(|one| take_better(one, &mut best, &mut least));
                 step *= 0.5;
             }

@@ -52,13 +52,13 @@ const EXPLAINED_OFTEN: f64 = 3.0;
 /// few coefficients and nothing else is said,
 const SURE: f64 = 36.0;
 const FEW: usize = 2;
+/// but for what is met seldom by its nature: a wall, a load that changes sides.
+const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Share of the remaining squared error that no model's error explains, if every block says so (standard errors of what is explained), and of the
 /// least amplitude what is enough then: what a wrong form leaves, another one explains in part, or in some blocks.
 const NEARLY_ALL: f64 = 0.9;
 const EVERYWHERE: f64 = 6.0;
 const LESS_THEN: f64 = 0.4;
-/// but for what is met seldom by its nature: a wall, a load that changes sides.
-const SELDOM: [&str; 2] = ["external_contact", "backlash"];
 /// Share of what an effect explains that may be where the nominal model is wrong by far more, if it begins or ends on the way: in the opened
 /// cases that were looked at it is 0.44 at most of what is there, and 0.77 at least of what is none.
 const OF_THE_MODEL: f64 = 2.0 / 3.0;

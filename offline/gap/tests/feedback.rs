@@ -321,10 +321,9 @@ fn friction_that_is_more_at_rest_is_told_beside_the_sliding_friction_that_the_si
     let outcome = gap_beside(&simulated, &runs(&robot), &runs(&simulated));
     assert_eq!(named(&outcome.report), ["stribeck_friction"], "{}", outcome.report.summary);
     let parameters = &outcome.report.verdicts[0].parameters;
-    let value = |name: &str| parameters.iter().find(|parameter| parameter.name == name).expect("a parameter").value;
-    assert!(value("f_c").abs() < 0.1 && (value("f_s") - 0.6).abs() < 0.2, "{parameters:?}");
-    let none = parameters.iter().find(|parameter| parameter.name == "f_c").expect("it is told").ci95;
-    assert!(none[0] < 0.0 && none[1] > 0.0, "{parameters:?}");
+    let [f_c, f_s] = ["f_c", "f_s"].map(|name| parameters.iter().find(|parameter| parameter.name == name).expect("a parameter"));
+    assert!(f_c.value.abs() < 0.1 && (f_s.value - 0.6).abs() < 0.2, "{parameters:?}");
+    assert!(f_c.ci95[0] < 0.0 && f_c.ci95[1] > 0.0, "{parameters:?}");
     let corrected = RobotModel::from_toml(outcome.corrected.as_deref().expect("a corrected model"), None).expect("it can be read");
     assert!(corrected.effects().iter().any(|effect| effect.physics.name() == "stribeck_friction"), "{corrected:?}");
 }

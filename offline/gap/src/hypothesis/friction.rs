@@ -170,9 +170,8 @@ const NARROWEST: f64 = 1.1;
 
 /// Is a shape a Stribeck curve as narrow as one may be?
 pub(super) fn is_a_spike(family: &Family, shape: &[f64]) -> bool {
-    let slowest = |family: &Family| family.grid.iter().map(|start| start[0]).fold(f64::INFINITY, f64::min);
-    let least = || STRIBECK_LEAST / STRIBECK_SPEED[0] * slowest(family);
-    family.physics == STRIBECK && shape[0] <= NARROWEST * least()
+    // The grid begins with the slowest of its speeds.
+    family.physics == STRIBECK && shape[0] <= NARROWEST * STRIBECK_LEAST / STRIBECK_SPEED[0] * family.grid[0][0]
 }
 
 /// Candidates for the presliding travel of a joint, rad or m.
