@@ -137,7 +137,7 @@ fn main() {
                 format!("{:.2}/{:.2}", before / floor, gap::series::rms(left.into_iter()) / floor)
             })
             .collect();
-        let _ = write!(line, " controller {:?}", gap::controller::changed(&problem));
+        let _ = write!(line, " controller {:?}", gap::controller::changed(&problem, &[]));
         let ceiling = gap::flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
         let _ = write!(
             line,

@@ -465,7 +465,9 @@ fn analyse_with(
         floors: &floors,
         floor_methods: &floor_methods,
         beside: &beside,
-        controller: (simulated_by_lab && !late).then(|| crate::controller::changed(&problem)).flatten(),
+        controller: (simulated_by_lab && !late)
+            .then(|| crate::controller::changed(&problem, &sized(&answer.effects, &estimates)))
+            .flatten(),
         learnt: !sims.is_empty(),
         unmodelled,
         refused: refused.as_ref(),

@@ -4,6 +4,9 @@
 //! torque answers the tracking error. The law is learnt from the simulation, where it has to explain nearly all of the torque,
 //! and applied to what the recording's controller saw.
 
+use crate::cell::Channel;
+use crate::held_out::Sized;
+use crate::hypothesis::{CARRIED, torque_scale};
 use crate::linear::least_squares;
 use crate::motion::Motion;
 use crate::nominal::Evaluator;
@@ -25,6 +28,8 @@ const ONE_LAW: f64 = 1.6;
 const KEPT: f64 = 1.0 / 3.0;
 /// Error, its derivative, its integral.
 const GAINS: usize = 3;
+/// Which of the columns is what the motor has to give.
+const OF_MOTOR: usize = 4;
 
 /// A joint whose torque answers its tracking error otherwise than in the simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,32 +42,71 @@ pub struct Changed {
     pub missed: [f64; 2],
 }
 
+/// How the recorded torque of a joint may be read.
+struct Reading {
+    /// A motor that gives so many times its torque may be logged as what it gives, or as what it was asked for.
+    scale: f64,
+    /// What the motor has to give beside the nominal load, row by row of the joint's torque: a law that the simulation's torque cannot tell from its
+    /// load asks for that too. Empty: nothing.
+    added: Vec<f64>,
+}
+
 /// What a controller sees at the rows, and the torque that it gives.
 struct Seen {
     columns: Vec<Vec<f64>>,
     torque: Vec<f64>,
-    run: Vec<usize>,
+    /// Run and sample.
+    rows: Vec<(usize, usize)>,
     kept: Vec<bool>,
 }
 
-/// The joint where it shows most, if any.
-pub fn changed(problem: &Problem) -> Option<Changed> {
+/// The joint where it shows most, if any, beside the effects that were found: however the recorded torque is read, the controller is another one.
+pub fn changed(problem: &Problem, effects: &[Sized]) -> Option<Changed> {
     let sims: Vec<&Motion> = problem.pairs.iter().filter_map(|pair| pair.sim.as_ref()).collect();
     let reals: Vec<&Motion> = problem.pairs.iter().map(|pair| &pair.real).collect();
     if sims.len() < reals.len() {
         return None;
     }
-    let all = (0..problem.robot.joint_count()).filter_map(|j| at_joint(problem, &reals, &sims, j));
+    let all = (0..problem.robot.joint_count()).filter_map(|j| {
+        let as_logged = at_joint(problem, &reals, &sims, j, &Reading { scale: 1.0, added: Vec::new() })?;
+        let told = |reading: &Reading| at_joint(problem, &reals, &sims, j, reading).is_some();
+        readings(problem, effects, j).iter().all(told).then_some(as_logged)
+    });
     all.max_by(|a, b| (a.missed[0] / a.missed[1]).total_cmp(&(b.missed[0] / b.missed[1])))
 }
 
-fn at_joint(problem: &Problem, reals: &[&Motion], sims: &[&Motion], j: usize) -> Option<Changed> {
+/// How else than as it was logged the torque of a joint may be read, by what was found.
+fn readings(problem: &Problem, effects: &[Sized], j: usize) -> Vec<Reading> {
+    let of_motor = effects.iter().filter(|(claim, _)| claim.family.joints == [j]);
+    let scales = of_motor.filter_map(|(claim, theta)| torque_scale(&claim.family, theta));
+    let mut all: Vec<Reading> = scales.map(|scale| Reading { scale, added: Vec::new() }).collect();
+    let Some(cell) = problem.cell(Channel::JointTorque, j) else { return all };
+    let mut added: Vec<f64> = Vec::new();
+    for (claim, theta) in effects.iter().filter(|(claim, _)| CARRIED.contains(&claim.family.physics)) {
+        let effect = claim.effect(cell, theta);
+        added.resize(added.len().max(effect.len()), 0.0);
+        added.iter_mut().zip(effect).for_each(|(sum, x)| *sum += x);
+    }
+    if !added.is_empty() {
+        all.push(Reading { scale: 1.0, added });
+    }
+    all
+}
+
+fn at_joint(problem: &Problem, reals: &[&Motion], sims: &[&Motion], j: usize, reading: &Reading) -> Option<Changed> {
     let sim = seen(problem, sims, j)?;
     let everything: Vec<usize> = (0..sim.columns.len()).collect();
     let law = fit(&[(Part { seen: &sim, whole: true, over: 1.0 }, &sim.torque)], &everything);
     let usual = rms(without_means(&sim, &sim.torque).into_iter());
     let left = rms(missed(&sim, &sim.torque, &everything, &law).into_iter()).max(NOTHING * usual);
-    let real = seen(problem, reals, j)?;
+    let mut real = seen(problem, reals, j)?;
+    real.torque.iter_mut().for_each(|torque| *torque *= reading.scale);
+    if let Some(cell) = problem.cell(Channel::JointTorque, j).filter(|_| !reading.added.is_empty()) {
+        let rows = &problem.cells[cell].rows;
+        for (row, load) in real.rows.iter().zip(&mut real.columns[OF_MOTOR]) {
+            *load += rows.binary_search(row).map_or(0.0, |k| reading.added[k]);
+        }
+    }
     let off: Vec<f64> = missed(&real, &real.torque, &everything, &law);
     let gains: Vec<usize> = (0..GAINS).collect();
     let change = fit(&[(Part { seen: &real, whole: false, over: 1.0 }, &off)], &gains);
@@ -90,7 +134,7 @@ fn at_joint(problem: &Problem, reals: &[&Motion], sims: &[&Motion], j: usize) ->
 /// None where the recording has no commands or no torque.
 fn seen(problem: &Problem, runs: &[&Motion], j: usize) -> Option<Seen> {
     let mut evaluator = Evaluator::new(problem.robot, problem.nominal);
-    let mut out = Seen { columns: vec![Vec::new(); GAINS + 4], torque: Vec::new(), run: Vec::new(), kept: Vec::new() };
+    let mut out = Seen { columns: vec![Vec::new(); GAINS + 4], torque: Vec::new(), rows: Vec::new(), kept: Vec::new() };
     for (r, motion) in runs.iter().enumerate() {
         let (command, torque) = (motion.run.command.as_ref()?, motion.torque.as_ref()?);
         let goal = motion.window.apply(&command[j], 0);
@@ -118,7 +162,7 @@ fn seen(problem: &Problem, runs: &[&Motion], j: usize) -> Option<Seen> {
             ];
             out.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
             out.torque.push(torque[j][i]);
-            out.run.push(r);
+            out.rows.push((r, i));
             out.kept.push(i >= aside);
         }
     }
@@ -128,7 +172,7 @@ fn seen(problem: &Problem, runs: &[&Motion], j: usize) -> Option<Seen> {
 
 /// A series less its mean over each run: where an integral began is not known.
 fn without_means(seen: &Seen, series: &[f64]) -> Vec<f64> {
-    less_means(series, |k| seen.run[k])
+    less_means(series, |k| seen.rows[k].0)
 }
 
 /// What was seen, the whole or all but what is kept aside, over a number that says what it is worth.

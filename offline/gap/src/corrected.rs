@@ -14,8 +14,8 @@ use crate::builtin::along_motion;
 use crate::found::Found;
 use crate::given::Given;
 use crate::hypothesis::{
-    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, WITH_OTHER_LINKS,
-    Window, direction,
+    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, ROTOR, SENSOR, TOOL_LENGTH, TOOL_TWIST,
+    WITH_OTHER_LINKS, Window, direction,
 };
 use crate::intervals::Estimate;
 use crate::known;
@@ -57,9 +57,10 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         let window = last_window(found, k);
         let put = |model: &RobotModel, window: Window| {
             let mut with = model.clone();
-            for (effect, sign) in
-                [as_effect(found, candidate, estimate, window)?].into_iter().chain(beside(&before, candidate, estimate, window))
-            {
+            if candidate.family.form == ROTOR {
+                put_on_rotor(&mut with, candidate.family.joints[0], estimate.coefficients[0])?;
+            }
+            for (effect, sign) in effects(found, &before, candidate, estimate, window)? {
                 if !merged(&mut with, &effect, sign) {
                     if sign < 0.0 {
                         return Err::<_, String>("there is less of it than none".to_owned());
@@ -193,10 +194,15 @@ fn merged(model: &mut RobotModel, more: &Effect, sign: f64) -> bool {
     true
 }
 
-/// Less of the friction that the drive itself has; false where it has not so much.
+/// Less of the friction, or of the give of the cable, that the drive itself has; false where it has not so much.
 fn taken_off_drive(model: &mut RobotModel, less: &Effect) -> bool {
     let (Bound::Joint(joint) | Bound::Motor(joint)) = less.bound else { return false };
     let Some(mut drive) = model.drives().get(joint).copied() else { return false };
+    if let Physics::CableStretch(CableStretch { k, .. }) = less.physics {
+        // In series: compliances are taken from one another.
+        drive.stiffness = 1.0 / (1.0 / drive.stiffness - 1.0 / k);
+        return drive.stiffness.is_finite() && drive.stiffness > 0.0 && model.set_drive(joint, &drive).is_ok();
+    }
     let ratio = drive.reduction.abs();
     let (at_joint, at_motor, scale, amount) = match less.physics {
         Physics::CoulombFriction(CoulombFriction { f_c, .. }) => {
@@ -215,6 +221,16 @@ fn taken_off_drive(model: &mut RobotModel, less: &Effect) -> bool {
     *at_joint *= left;
     *at_motor *= left;
     model.set_drive(joint, &drive).is_ok()
+}
+
+/// More, or less, inertia of a joint's drive, as the joint feels it.
+fn put_on_rotor(model: &mut RobotModel, joint: usize, more: f64) -> Result<(), String> {
+    let mut drive = *model.drives().get(joint).ok_or("it has no drive")?;
+    drive.rotor_inertia_kg_m2 += more / (drive.reduction * drive.reduction);
+    if drive.rotor_inertia_kg_m2 < 0.0 {
+        return Err("there is less of it than none".to_owned());
+    }
+    model.set_drive(joint, &drive).map_err(|error| error.to_string())
 }
 
 /// Share of an effect by which more than all of it may seem to be gone.
@@ -304,6 +320,21 @@ fn believe(model: &mut RobotModel, found: &Found) {
         // A link that was learnt to weigh less than nothing stays as the lab has it.
         let _ = model.set_link_inertia(link, &LinkInertia::from_parameters(learnt));
     }
+}
+
+/// What is found of one physics as effects for the simulator, and -1 where one is to be taken off; none of a drive's inertia, which the model has.
+fn effects(
+    found: &Found,
+    before: &RobotModel,
+    candidate: &Candidate,
+    estimate: &Estimate,
+    window: Window,
+) -> Result<Vec<(Effect, f64)>, String> {
+    if candidate.family.form == ROTOR {
+        return Ok(Vec::new());
+    }
+    let main = as_effect(found, candidate, estimate, window)?;
+    Ok([main].into_iter().chain(beside(before, candidate, estimate, window)).collect())
 }
 
 /// One effect for the simulator, and -1 where it is to be taken off; the reason where it has no such term.

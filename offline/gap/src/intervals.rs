@@ -1,6 +1,8 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
-use crate::hypothesis::{AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, START, STRIBECK_RANGE, rounds};
+use crate::hypothesis::{
+    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, rounds,
+};
 use crate::nominal::Nominal;
 use crate::parallel;
 use crate::parameters::{Named, parameters};
@@ -96,7 +98,7 @@ fn sizes(physics: &str, form: &str) -> &'static [(&'static str, f64)] {
         ("joint_coupling", "position" | "position and torque") => &[("c_ij", 0.0)],
         ("payload", _) => &[("m_p", 0.0)],
         ("gravity_direction", _) => &[("a", 0.0), ("b", 0.0)],
-        ("link_inertia", "scaled") => &[("dpi_B", 0.0)],
+        ("link_inertia", "scaled" | ROTOR) => &[("dpi_B", 0.0)],
         ("motor_torque_scale", "scale" | "scale, rounded") => &[("kappa", 1.0)],
         ("torque_ripple", _) => &[("amp", 0.0)],
         ("joint_offset", _) => &[("o", 0.0)],
@@ -118,8 +120,10 @@ fn supposed(physics: &str, form: &str, name: &str) -> f64 {
 }
 
 /// What a parameter can be: an interval does not reach beyond.
-fn possible(physics: &str, form: &str, name: &str) -> [f64; 2] {
-    match (physics, name) {
+fn possible(physics: &str, form: &str, named: &Named) -> [f64; 2] {
+    match (physics, named.name) {
+        // Of less than the simulation has.
+        ("cable_stretch", "k") if named.value < 0.0 => [f64::NEG_INFINITY, 0.0],
         // The law of a spring to the ground may bend the other way: of a Bouc-Wen element in these numbers, z_m is negative then.
         ("cable_hysteresis", _) if form == GROUND => [f64::NEG_INFINITY, f64::INFINITY],
         ("cable_hysteresis", "a") => [0.0, 1.0],
@@ -321,7 +325,7 @@ fn of_candidates(
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
                     let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name));
-                    let [least, most] = possible(physics, form, named.name);
+                    let [least, most] = possible(physics, form, named);
                     (
                         named.clone(),
                         [(named.value - half).max(least.min(named.value)), (named.value + half).min(most.max(named.value))],

@@ -1,6 +1,6 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, STRIBECK_RANGE, TOOL_TWIST, TWISTED};
+use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, torque_scale};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 use std::f64::consts::TAU;
@@ -77,13 +77,13 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         // What the motion does not show of it is not told.
         ("gravity_direction", _) => ["a", "b"].iter().filter_map(|name| Some(named(name, "rad", theta[place(name)?]))).collect(),
         ("link_inertia", "scaled") => vec![named("dpi_B", "kg", theta[0] * robot.arm.link_inertia(joint).parameters()[0])],
+        ("link_inertia", ROTOR) => vec![named("dpi_B", unit("kg.m2", "kg"), theta[0])],
         ("link_inertia", _) => {
             let k = shaped("parameter") as usize;
             vec![named("dpi_B", ["kg", "kg.m", "kg.m2"][usize::from(k > 0) + usize::from(k > 3)], theta[0])]
         }
         ("motor_torque_scale", form) => {
-            let scale = if form == "offset" { 1.0 } else { 1.0 / (1.0 + theta[0]) };
-            let mut all = vec![named("kappa", "1", scale)];
+            let mut all = vec![named("kappa", "1", torque_scale(&candidate.family, theta).unwrap_or(1.0))];
             let per_count = robot.drives[joint].torque_per_count * robot.motor_from_joint[(joint, joint)];
             if form.ends_with("offset") && per_count != 0.0 {
                 all.push(named("d_0", "DAC", theta[theta.len() - 1] / per_count));

@@ -5,7 +5,7 @@ use gap_report::{BeforeAfter, HeatMap, HeatRun, Pictures, Quantity, Share, Signa
 use crate::cell::Channel;
 use crate::found::Found;
 use crate::held_out::{left, others, sized};
-use crate::hypothesis::Candidate;
+use crate::hypothesis::{Candidate, ROTOR};
 use crate::problem::Problem;
 use crate::series::rms;
 use crate::told::{cell_name, cell_quantity, cell_unit, main_cell, told};
@@ -116,6 +116,10 @@ fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, 
                 at(&|r, i| motion(r).position[other][i]),
             )
         }
+        "link_inertia" if family.form == ROTOR => (
+            Quantity::new(format!("Acceleration of {name}"), format!("{unit}/s²")),
+            at(&|r, i| motion(r).drive_acceleration[joint][i]),
+        ),
         "thermal_drift" | "cable_creep" => (Quantity::new("Time", "s"), at(&|r, i| motion(r).run.time_s(i))),
         _ => (Quantity::new(format!("Position of {name}"), unit), at(&|r, i| motion(r).position[joint][i])),
     }

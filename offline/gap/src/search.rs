@@ -5,6 +5,7 @@ mod by_run;
 mod explained;
 mod likeliest;
 mod otherwise;
+mod recast;
 mod settle;
 
 use explained::explained;
@@ -54,10 +55,13 @@ const SURE: f64 = 36.0;
 const FEW: usize = 2;
 /// but for what is met seldom by its nature: a wall, a load that changes sides.
 const SELDOM: [&str; 2] = ["external_contact", "backlash"];
-/// Share of the remaining squared error that no model's error explains, if every block says so (standard errors of what is explained), and of the
-/// least amplitude what is enough then: what a wrong form leaves, another one explains in part, or in some blocks.
+/// Share of the remaining squared error that no model's error explains, if every block says so (standard errors of what is explained; or of the ranks of
+/// what they gain, if as good as nothing is left), and of the least amplitude what is enough then: what a wrong form leaves, another one explains in
+/// part, or in some blocks.
 const NEARLY_ALL: f64 = 0.9;
-const EVERYWHERE: f64 = 6.0;
+const EVERYWHERE: f64 = 5.0;
+const ALL: f64 = 0.97;
+const IN_EACH: f64 = 3.0;
 const LESS_THEN: f64 = 0.4;
 /// Share of what an effect explains that may be where the nominal model is wrong by far more, if it begins or ends on the way: in the opened
 /// cases that were looked at it is 0.44 at most of what is there, and 0.77 at least of what is none.
@@ -268,6 +272,9 @@ pub fn search<'p>(
     if let Some((others, of_others, beyond)) = search.otherwise(&chosen, firsts, trace) {
         (chosen, effects, next) = (others, of_others, beyond);
     }
+    if let Some((others, of_others, beyond)) = search.recast(&chosen, trace) {
+        (chosen, effects, next) = (others, of_others, beyond);
+    }
     let grams = search.grams(&chosen, None);
     let fit = search.scorer.fit(&grams);
     search.scorer.temper(&grams, &fit);
@@ -432,7 +439,8 @@ impl Search<'_, '_> {
 
     /// Of the largest effect's amplitude, what a further one has to have.
     fn least_amplitude(&self, judged: &Judged) -> f64 {
-        let surely = judged.share >= NEARLY_ALL && judged.gain.explained >= EVERYWHERE;
+        let everywhere = judged.gain.explained >= EVERYWHERE || (judged.share >= ALL && judged.gain.ranks >= IN_EACH);
+        let surely = judged.share >= NEARLY_ALL && everywhere;
         if surely { LESS_THEN * self.thresholds.amplitude } else { self.thresholds.amplitude }
     }
 

@@ -290,6 +290,107 @@ fn of_urdf(text: &str) -> RobotModel {
     robot
 }
 
+/// The robot with so much more inertia at the motor of a joint, kg·m².
+fn with_rotor(robot: &RobotModel, joint: usize, more: f64) -> RobotModel {
+    let (mut other, mut drive) = (robot.clone(), robot.drives()[joint]);
+    drive.rotor_inertia_kg_m2 += more;
+    other.set_drive(joint, &drive).expect("a drive");
+    other
+}
+
+/// What a drive has, kg·m².
+fn rotor(robot: &RobotModel, joint: usize) -> f64 {
+    robot.drives()[joint].rotor_inertia_kg_m2
+}
+
+#[test]
+fn a_drives_inertia_is_fed_back() {
+    let more = 0.5 * rotor(&nominal(), 1);
+    let heavier = with_rotor(&nominal(), 1, more);
+    let (corrected, others) = fed_back_of(&heavier, "link_inertia");
+    let missed = rotor(&corrected, 1) - rotor(&heavier, 1);
+    assert!(missed.abs() < 0.05 * more, "{missed} of {more}");
+    let outcome = gap(&with_rotor(&corrected, 1, 0.3 * more), &others);
+    assert_eq!(named(&outcome.report), ["link_inertia"], "{}", outcome.report.summary);
+}
+
+#[test]
+fn a_cable_that_gives_way_less_is_fed_back() {
+    let stiffness = |robot: &RobotModel| robot.drives()[1].stiffness;
+    let (mut stiffer, mut drive) = (nominal(), nominal().drives()[1]);
+    drive.stiffness *= 1.5;
+    stiffer.set_drive(1, &drive).expect("a drive");
+    let first = gap(&nominal(), &[1, 2].map(|seed| recorded(&stiffer, seed)));
+    assert_eq!(named(&first.report), ["cable_stretch"], "{}", first.report.summary);
+    assert!(first.report.summary.contains("less than in the simulation"), "{}", first.report.summary);
+    let k = &first.report.verdicts[0].parameters[0];
+    assert!(k.ci95[0] < k.value && k.value < k.ci95[1] && k.ci95[1] <= 0.0, "{k:?}");
+    let corrected = RobotModel::from_toml(first.corrected.as_ref().expect("a model"), None).expect("a robot");
+    assert!(
+        (stiffness(&corrected) / stiffness(&stiffer) - 1.0).abs() < 0.05,
+        "{} of {}",
+        stiffness(&corrected),
+        stiffness(&stiffer)
+    );
+    let second = gap(&corrected, &[3, 4].map(|seed| recorded(&stiffer, seed)));
+    assert_eq!(second.report.status, Status::NoMismatch, "{}", second.report.summary);
+}
+
+#[test]
+fn a_simulation_without_rotors_lacks_the_inertia_of_its_drives() {
+    // As most files of robots are; it was a motor's scale, or another elbow.
+    const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.5), ("rad", 0.5, 0.6)];
+    const ROTORS: [f64; 2] = [0.05, 0.02];
+    let robot = with_rotor(&with_rotor(&planar(), 0, ROTORS[0]), 1, ROTORS[1]);
+    let runs = |robot: &RobotModel| [1, 2].map(|seed| recorded_along(robot, seed, &JOINTS));
+    let outcome = gap_beside(&planar(), &runs(&robot), &runs(&planar()));
+    assert_eq!(named(&outcome.report), ["link_inertia"; 2], "{}", outcome.report.summary);
+    assert!(outcome.report.summary.contains("more inertia than in the simulation"), "{}", outcome.report.summary);
+    let corrected = RobotModel::from_toml(outcome.corrected.as_deref().expect("a corrected model"), None).expect("it can be read");
+    for (joint, there) in ROTORS.into_iter().enumerate() {
+        assert!((rotor(&corrected, joint) / there - 1.0).abs() < 0.1, "{} of {there}", rotor(&corrected, joint));
+    }
+}
+
+/// One link that swings.
+const PENDULUM: &str = r#"<robot name="pendulum"><link name="base"/>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="rod"/><origin rpy="-1.5708 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="100" velocity="10"/></joint>
+<link name="rod"><inertial><origin xyz="0 0.2 0"/><mass value="1.2"/><inertia ixx="0.015" iyy="0.001" izz="0.015" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="tip" type="fixed"><parent link="rod"/><child link="tool"/><origin xyz="0 0.4 0"/></joint><link name="tool"/></robot>"#;
+
+#[test]
+fn friction_and_inertia_of_a_drive_are_told_beside_each_other() {
+    // Each of the smaller ones leaves little unsaid; what all but one leave without a name was the whole of it.
+    const JOINTS: [(&str, f64, f64); 1] = [("rad", 0.3, 0.7)];
+    let bare = of_urdf(PENDULUM);
+    let robot = and(with_rotor(&bare, 0, 0.03), "coulomb_friction", Bound::Joint(0), &[("f_c", 0.15)]);
+    let robot = and(robot, "viscous_friction", Bound::Joint(0), &[("b", 0.1)]);
+    for moves in [recorded_along, moved_and_rested] {
+        let runs = |robot: &RobotModel| [1, 2].map(|seed| moves(robot, seed, &JOINTS));
+        let report = gap_beside(&bare, &runs(&robot), &runs(&bare)).report;
+        let mut names = named(&report);
+        names.sort();
+        assert_eq!(names, ["coulomb_friction", "link_inertia", "viscous_friction"], "{}", report.summary);
+    }
+}
+
+#[test]
+fn a_motors_torque_logged_as_it_is_given_is_no_other_controller() {
+    const JOINTS: [(&str, f64, f64); 2] = [("rad", 0.2, 0.5), ("rad", 0.5, 0.6)];
+    let stronger = |seed: u64| {
+        let mut run = recorded_along(&planar(), seed, &JOINTS);
+        run.columns
+            .iter_mut()
+            .filter(|column| column.name.starts_with("tau_1"))
+            .flat_map(|column| &mut column.values)
+            .for_each(|x| *x *= 1.2);
+        run
+    };
+    let report = gap_beside(&planar(), &[1, 2].map(stronger), &[1, 2].map(|seed| moved_along(&planar(), seed, &JOINTS))).report;
+    assert_eq!(report.status, Status::Explained, "{}", report.summary);
+    assert_eq!(named(&report), ["motor_torque_scale"], "{}", report.summary);
+}
+
 #[test]
 fn nothing_is_missing_in_slow_motion_whose_places_are_in_counts() {
     // Out of counts a slow velocity stands and jumps, and with it the friction that a simulation has, which had no encoders: it was warming up, or inertia.

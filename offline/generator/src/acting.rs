@@ -41,6 +41,8 @@ pub enum Act {
     Gravity(Vector3<f64>),
     /// Change of one link: mass factor, shift of its centre in m, inertia factor.
     Link { mass: f64, shift: Vector3<f64>, inertia: f64 },
+    /// Inertia of a joint's drive, factor.
+    Rotor(f64),
     /// Twist added to the fixed turn after the link, rad; length added to it, m.
     Geometry { twist: f64, length: f64 },
     /// Torque constant factor.
@@ -111,6 +113,7 @@ impl Acting {
             "pulley_eccentricity" => Act::Eccentric([v("e_over_r"), v("period"), v("phi")]),
             "payload" => Act::Payload(v("m_p"), Vector3::new(v("c_x"), v("c_y"), v("c_z"))),
             "gravity_direction" => Act::Gravity(Rotation3::new(Vector3::new(v("a"), v("b"), 0.0)) * arm.gravity()),
+            "link_inertia" if v("rotor_factor") > 0.0 => Act::Rotor(v("rotor_factor")),
             "link_inertia" => Act::Link {
                 mass: v("mass_factor"),
                 shift: Vector3::new(v("shift_x"), v("shift_y"), v("shift_z")),

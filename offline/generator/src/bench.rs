@@ -57,13 +57,15 @@ impl Bench<'_> {
         let mut draft =
             draw(&wanted.physics, joint, &self.scene, random).ok_or_else(|| format!("no physics `{}`", wanted.physics))?;
         draft.effect.interval = wanted.interval.or(draft.effect.interval);
-        if wanted.onset && draft.effect.interval.is_none() {
+        // A drive's inertia is as it is all the time.
+        let lasts = draft.growing.iter().any(|(name, ..)| *name == "rotor_factor");
+        if wanted.onset && !lasts && draft.effect.interval.is_none() {
             draft.effect.interval = Some(interval(self.seconds, random));
         }
         if wanted.by_run && self.runs < 2 {
             return Err("an effect by run asks for two runs at least".into());
         }
-        if wanted.by_run {
+        if wanted.by_run && !lasts {
             // What is there for a while by its nature is so in each run.
             let is_passing = draft.effect.interval.is_some();
             draft.effect.intervals = intervals(is_passing, self.runs, self.seconds, random);

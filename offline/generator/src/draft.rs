@@ -122,6 +122,19 @@ fn bodies(physics: &str, j: usize, scene: &Scene, random: &mut Random) -> Option
             let base = 0.012 * scale;
             draft(Effect::at(physics, None, &[]), vec![times("a", base * cos), times("b", base * sin)], 0.3 / base, torque, &[])
         }
+        // what turns with the motor, weighs nothing and loads no other joint
+        "link_inertia" if random.chance(0.25) => {
+            let base = random.sign() * 0.1 * scale;
+            let growing = vec![("rotor_factor", false, Growth::Power(base))];
+            // a quarter of it to four times
+            draft(
+                Effect::at(physics, Some(j + 1), &[]),
+                growing,
+                4.0_f64.ln() / base.abs(),
+                place(Channel::JointTorque, Some(j)),
+                &[],
+            )
+        }
         "link_inertia" => {
             let last = j + 1 == scene.arm.size();
             // more mass at the last link would be a payload

@@ -134,6 +134,7 @@ impl<const N: usize> Plant<N> {
         let mut end_speed = motor_speed;
         let mut gear = [1.0; N];
         let mut carried = [0.0; N];
+        let mut rotor = self.rotor;
         let mut motor_brake: [Brake; N] = std::array::from_fn(|j| self.nominal_brake(j));
         let mut link_brake = [Brake::default(); N];
         let mut pushed = [0.0; N];
@@ -178,6 +179,7 @@ impl<const N: usize> Plant<N> {
                     end_speed[j] += w * gain * joint_speed[*from];
                     carried[j] = w * gain;
                 }
+                Act::Rotor(factor) => rotor[j] *= 1.0 + w * (factor - 1.0),
                 Act::MotorScale(kappa) => drive[j] *= 1.0 + w * (kappa - 1.0),
                 Act::Ripple([size, order, phase]) => drive[j] -= w * size * (order * u * self.arm.drives[j].ratio + phase).sin(),
                 Act::Compliance(compliance) => self.cables[j].compliance += w * compliance,
@@ -210,7 +212,7 @@ impl<const N: usize> Plant<N> {
             let push = drive[j] - gear[j] * self.load[j];
             let before = self.motor_speed[j];
             self.motor_speed_before[j] = before;
-            let mean = brake_step(before, push, self.rotor[j], &motor_brake[j], &self.motor_contact[j]);
+            let mean = brake_step(before, push, rotor[j], &motor_brake[j], &self.motor_contact[j]);
             self.motor_contact[j].advance(mean, STEP);
             self.motor_speed[j] = 2.0 * mean - before;
             self.motor[j] += STEP * self.motor_speed[j];

@@ -165,6 +165,9 @@ impl Facts<'_> {
             return format!("the link at {at} has another mass or inertia than in the simulation");
         };
         let (by, less) = (amount(&size(found)), found.value < 0.0);
+        if self.0.location.subsystem == Subsystem::Motor {
+            return format!("the drive of {at} has {by} {} inertia than in the simulation", if less { "less" } else { "more" });
+        }
         match found.unit.as_str() {
             "kg" => format!("the link at {at} is {by} {} than in the simulation", if less { "lighter" } else { "heavier" }),
             "kg.m" => format!("the mass of the link at {at} lies elsewhere than in the simulation, by a moment of {by}"),

@@ -64,6 +64,11 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
 }
 
+/// How many times its torque a motor gives by these coefficients; none of another physics, or of an offset alone.
+pub(crate) fn torque_scale(family: &Family, theta: &[f64]) -> Option<f64> {
+    (family.physics == "motor_torque_scale" && family.form != "offset").then(|| 1.0 / (1.0 + theta[0]))
+}
+
 /// A wave so many times per turn of the motor, smoothed as the torque is: what turns fast is gone from both. Where the joint
 /// creeps or holds nothing is claimed: a standing wave is a constant, and many constants explain anything. Nor in a run without its motors.
 fn ripple(dictionary: &Dictionary, j: usize, order: f64, phase: f64) -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! Weights, links and the direction of gravity.
+//! Weights, links, what turns with the motors, and the direction of gravity.
 
 use arm::serial::{LinkInertia, PARAMETERS};
 use nalgebra::{DMatrix, Vector3};
@@ -9,6 +9,11 @@ use crate::cell::Channel;
 
 /// The form of a payload whose place is supposed, not asked of the data.
 pub(crate) const AT_THE_TIP: &str = "at the tip";
+/// The form of an inertia that turns with the motor: it weighs nothing and loads no other joint. Files of robots seldom have it.
+pub(crate) const ROTOR: &str = "of the drive";
+
+/// What asks the motors for torque beside friction: bodies, their weight, and what touches them.
+pub(crate) const CARRIED: [&str; 4] = ["payload", "link_inertia", "gravity_direction", "external_contact"];
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if !dictionary.problem.has(TORQUE) {
@@ -47,6 +52,11 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     // The links of one robot are the same in two recordings of it.
     let altered = if dictionary.problem.from_recording { 200.0 } else { 0.0 };
     for link in 0..n {
+        let rotor = Family::fixed("link_inertia", &[link], ROTOR, TORQUE, &[Bound::Free], move |d| {
+            vec![d.effort_of(link, d.at_grid(|r, i, _| d.problem.pairs[r].real.drive_acceleration[link][i]), false)]
+        });
+        // About an upright axis a link's inertia is that of its drive, and its mass a guess.
+        all.push(rotor.penalised(0.5 + altered));
         let parameters = robot.arm.link_inertia(link).parameters();
         if parameters.iter().any(|x| *x != 0.0) {
             all.push(
@@ -59,7 +69,10 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
         // The first of those that the motion shows is the one that is reported: the mass, where it can be seen.
         let free = independent(dictionary, link, &EVERY);
         let Some(first) = free.first().map(|k| *k as f64) else { continue };
-        let bounds = vec![Bound::Free; free.len()];
+        let mut bounds = vec![Bound::Free; free.len()];
+        if free[0] == 0 && parameters[0] > 0.0 {
+            bounds[0] = Bound::Between(-parameters[0], MOST_MASS * parameters[0]);
+        }
         let family = Family::shaped(
             "link_inertia",
             &[link],
@@ -83,6 +96,8 @@ pub(super) const TOLD_APART: f64 = 0.1;
 /// Share of the largest torque of a unit of any parameter below which one gives none: what is left is rounding, of right angles in a URDF too
 /// (1.57).
 const NONE_AT_ALL: f64 = 1e-3;
+/// Times its mass that a link may be heavier than its file has it.
+const MOST_MASS: f64 = 5.0;
 /// Every parameter of a link: mass, first moments, second moments.
 const EVERY: [usize; PARAMETERS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
 

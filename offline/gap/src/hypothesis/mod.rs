@@ -14,7 +14,7 @@ mod transmission;
 mod unknown;
 mod windows;
 
-pub(crate) use actuation::{RIPPLE, shaken};
+pub(crate) use actuation::{RIPPLE, shaken, torque_scale};
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
@@ -28,7 +28,7 @@ pub(crate) use environment::WALL;
 pub use environment::direction;
 pub(crate) use friction::{AT_MOTOR, STRIBECK_RANGE};
 pub(crate) use gravity::WITH_OTHER_LINKS;
-pub(crate) use inertial::AT_THE_TIP;
+pub(crate) use inertial::{AT_THE_TIP, CARRIED, ROTOR};
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
 pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
 
@@ -276,10 +276,10 @@ impl Family {
         !ALL_THE_TIME.contains(&self.physics) && self.may_have_edges()
     }
 
-    /// Steps would have an edge more than they say; and where a load hardly changes, two numbers of a bent spring are any constant (it is tried in
-    /// the windows of a memory alone).
+    /// Steps would have an edge more than they say; a drive stays as it is; and where a load hardly changes, two numbers of a bent spring are any
+    /// constant (it is tried in the windows of a memory alone).
     pub fn may_have_edges(&self) -> bool {
-        self.form != STEPS_IN_TIME && !self.is_hardening()
+        ![STEPS_IN_TIME, ROTOR].contains(&self.form) && !self.is_hardening()
     }
 
     /// Is it a spring that is bent, its numbers those of a load alone?

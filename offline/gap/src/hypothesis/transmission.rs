@@ -172,7 +172,10 @@ fn push_elastic(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     if usual < 1e-9 {
         return;
     }
-    all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[Bound::Positive], move |d| {
+    // Nor can a cable give way less than not at all: of what the simulation has of it, all may be too much.
+    let there = dictionary.problem.nominal.compliance[j][0];
+    let least = if there > 0.0 { Bound::Between(-there, f64::INFINITY) } else { Bound::Positive };
+    all.push(Family::fixed("cable_stretch", &[j], "linear", TRANSMISSION, &[least], move |d| {
         vec![d.strain_of(j, d.cable_load(j).to_vec())]
     }));
     // Its damper is stiff beside a softer spring: it gives way late.

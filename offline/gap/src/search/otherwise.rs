@@ -1,7 +1,7 @@
 //! The search, begun again with another effect first. What explains most by itself may be neither of two effects that are there: a step and a
 //! slow drift look like a cable that creeps, and what is beside that then explains little.
 
-use super::{Beyond, Effect, Scored, Search, price};
+use super::{Beyond, Effect, Scored, Search, price, resolution};
 use crate::floors::floor;
 use crate::hypothesis::Candidate;
 use crate::series::rms;
@@ -59,8 +59,9 @@ impl Search<'_, '_> {
             return None;
         }
         let fit = self.scorer.fit(&self.grams(chosen, None));
-        let of_cell =
-            |(c, left): (usize, Vec<f64>)| rms(left.into_iter()) / floor(&problem.cells[c]).max(problem.own_error(c)).max(1e-300);
+        let least =
+            |c: usize| floor(&problem.cells[c]).max(problem.own_error(c)).max(resolution(problem.cells[c].channel)).max(1e-300);
+        let of_cell = |(c, left): (usize, Vec<f64>)| rms(left.into_iter()) / least(c);
         Some(self.residuals(&chosen.iter().collect::<Vec<_>>(), &fit).into_iter().enumerate().map(of_cell).fold(0.0, f64::max))
     }
 

@@ -75,8 +75,8 @@ impl Search<'_, '_> {
     fn in_place_of(&mut self, effect: &Candidate, others: &[Candidate], of_a_ripple: &[Candidate]) -> Place {
         let base = self.grams(others, None);
         let mut ranked = self.rank(others);
-        // Claims that stand beside are not also rivals.
-        ranked.retain(|r| !others.iter().any(|o| o.same_claim(&r.candidate)));
+        // Claims that stand beside are not also rivals; a link and its drive are one claim, and may both be there.
+        ranked.retain(|r| r.candidate.same_claim(effect) || !others.iter().any(|o| o.same_claim(&r.candidate)));
         let Some(first) = ranked.first() else { return Place { ranked, first: None, accepted: None } };
         let judged = self.judged(&base, others, first);
         let first = (first.clone(), judged);
