@@ -33,7 +33,7 @@ pub struct Thresholds {
     pub amplitude: f64,
     /// Claims whose scores differ by less than this share are equal: the likeliest one is taken, which is mostly the simplest.
     pub equal: f64,
-    /// Most effects, beside two for each joint: a simulation may have been made without any friction.
+    /// Most effects, beside three for each joint: a simulation may have been made without any friction, and without rotors.
     pub effects: usize,
 }
 
@@ -289,7 +289,7 @@ impl Search<'_, '_> {
     /// Takes one more effect as long as one is acceptable beside those chosen.
     fn forward(&mut self, chosen: &mut Vec<Candidate>, trace: &mut dyn FnMut(String)) -> Beyond {
         let mut beyond = Beyond::default();
-        while chosen.len() < self.thresholds.effects + 2 * self.problem.robot.joint_count() {
+        while chosen.len() < self.thresholds.effects + 3 * self.problem.robot.joint_count() {
             let base = self.grams(chosen, None);
             let ranked = self.rank(chosen);
             ranked.iter().take(6).for_each(|scored| trace(describe(scored)));
