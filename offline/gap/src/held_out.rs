@@ -188,8 +188,8 @@ impl HeldOut<'_> {
     fn holds(&self, answer: &Answer, all: &[Sized], k: usize, thresholds: &Thresholds) -> bool {
         let (claim, coefficients) = all[k];
         let barely = is_barely(answer, k, thresholds);
-        // What came on the way may have gone before the rest.
-        let gone = claim.edges() > 0 && self.is_later_part();
+        // What came on the way may have gone before the rest; what is still there has to hold.
+        let gone = claim.edges() > 0 && self.is_later_part() && self.is_absent(all, k);
         if !barely && (OTHERWISE.contains(&claim.family.physics) || claim.family.physics == UNMODELLED || gone) {
             return true;
         }
