@@ -5,7 +5,7 @@
 //! and applied to what the recording's controller saw.
 
 use crate::cell::Channel;
-use crate::held_out::Sized;
+use crate::held_out::{Sized, left};
 use crate::hypothesis::{CARRIED, torque_scale};
 use crate::linear::least_squares;
 use crate::motion::Motion;
@@ -81,13 +81,10 @@ fn readings(problem: &Problem, effects: &[Sized], j: usize) -> Vec<Reading> {
     let scales = of_motor.filter_map(|(claim, theta)| torque_scale(&claim.family, theta));
     let mut all: Vec<Reading> = scales.map(|scale| Reading { scale, added: Vec::new() }).collect();
     let Some(cell) = problem.cell(Channel::JointTorque, j) else { return all };
-    let mut added: Vec<f64> = Vec::new();
-    for (claim, theta) in effects.iter().filter(|(claim, _)| CARRIED.contains(&claim.family.physics)) {
-        let effect = claim.effect(cell, theta);
-        added.resize(added.len().max(effect.len()), 0.0);
-        added.iter_mut().zip(effect).for_each(|(sum, x)| *sum += x);
-    }
-    if !added.is_empty() {
+    let carried: Vec<Sized> = effects.iter().filter(|(claim, _)| CARRIED.contains(&claim.family.physics)).copied().collect();
+    if !carried.is_empty() {
+        let before = &problem.cells[cell].residual;
+        let added = before.iter().zip(left(problem, cell, &carried)).map(|(y, left)| y - left).collect();
         all.push(Reading { scale: 1.0, added });
     }
     all

@@ -14,8 +14,8 @@ use crate::builtin::along_motion;
 use crate::found::Found;
 use crate::given::Given;
 use crate::hypothesis::{
-    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, ROTOR, SENSOR, TOOL_LENGTH, TOOL_TWIST,
-    WITH_OTHER_LINKS, Window, direction,
+    ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, WITH_OTHER_LINKS,
+    Window, direction,
 };
 use crate::intervals::Estimate;
 use crate::known;
@@ -57,10 +57,15 @@ pub(crate) fn model(given: &RobotModel, found: &Found, (runs, band): (&[Given], 
         let window = last_window(found, k);
         let put = |model: &RobotModel, window: Window| {
             let mut with = model.clone();
-            if candidate.family.form == ROTOR {
+            // The model has the inertia of its drives; all else is an effect.
+            let all = if candidate.is_of_a_drive() {
                 put_on_rotor(&mut with, candidate.family.joints[0], estimate.coefficients[0])?;
-            }
-            for (effect, sign) in effects(found, &before, candidate, estimate, window)? {
+                Vec::new()
+            } else {
+                let main = as_effect(found, candidate, estimate, window)?;
+                [main].into_iter().chain(beside(&before, candidate, estimate, window)).collect()
+            };
+            for (effect, sign) in all {
                 if !merged(&mut with, &effect, sign) {
                     if sign < 0.0 {
                         return Err::<_, String>("there is less of it than none".to_owned());
@@ -320,21 +325,6 @@ fn believe(model: &mut RobotModel, found: &Found) {
         // A link that was learnt to weigh less than nothing stays as the lab has it.
         let _ = model.set_link_inertia(link, &LinkInertia::from_parameters(learnt));
     }
-}
-
-/// What is found of one physics as effects for the simulator, and -1 where one is to be taken off; none of a drive's inertia, which the model has.
-fn effects(
-    found: &Found,
-    before: &RobotModel,
-    candidate: &Candidate,
-    estimate: &Estimate,
-    window: Window,
-) -> Result<Vec<(Effect, f64)>, String> {
-    if candidate.family.form == ROTOR {
-        return Ok(Vec::new());
-    }
-    let main = as_effect(found, candidate, estimate, window)?;
-    Ok([main].into_iter().chain(beside(before, candidate, estimate, window)).collect())
 }
 
 /// One effect for the simulator, and -1 where it is to be taken off; the reason where it has no such term.

@@ -5,7 +5,7 @@ use gap_report::{BeforeAfter, HeatMap, HeatRun, Pictures, Quantity, Share, Signa
 use crate::cell::Channel;
 use crate::found::Found;
 use crate::held_out::{left, others, sized};
-use crate::hypothesis::{Candidate, ROTOR};
+use crate::hypothesis::Candidate;
 use crate::problem::Problem;
 use crate::series::rms;
 use crate::told::{cell_name, cell_quantity, cell_unit, main_cell, told};
@@ -116,7 +116,7 @@ fn feature(problem: &Problem, candidate: &Candidate, cell: usize) -> (Quantity, 
                 at(&|r, i| motion(r).position[other][i]),
             )
         }
-        "link_inertia" if family.form == ROTOR => (
+        "link_inertia" if candidate.is_of_a_drive() => (
             Quantity::new(format!("Acceleration of {name}"), format!("{unit}/s²")),
             at(&|r, i| motion(r).drive_acceleration[joint][i]),
         ),

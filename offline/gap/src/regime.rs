@@ -2,12 +2,12 @@
 
 use gap_report::{Feature, Regime, Subsystem};
 
-use crate::hypothesis::{Candidate, ROTOR};
+use crate::hypothesis::Candidate;
 
 /// The regime that an effect is tied to.
 pub(crate) fn regime(candidate: &Candidate) -> Regime {
     let (feature, condition) = match candidate.family.physics {
-        "link_inertia" if candidate.family.form == ROTOR => (Feature::All, "proportional to the acceleration"),
+        "link_inertia" if candidate.is_of_a_drive() => (Feature::All, "proportional to the acceleration"),
         "coulomb_friction" => (Feature::VelocitySign, "constant with the sign of the velocity"),
         "viscous_friction" => (Feature::Speed, "proportional to the velocity"),
         "stribeck_friction" => (Feature::Speed, "more at slow speed"),
@@ -33,7 +33,7 @@ pub(crate) fn regime(candidate: &Candidate) -> Regime {
 /// The part of the robot.
 pub(crate) fn subsystem(candidate: &Candidate) -> Subsystem {
     match candidate.family.physics {
-        "link_inertia" if candidate.family.form == ROTOR => Subsystem::Motor,
+        "link_inertia" if candidate.is_of_a_drive() => Subsystem::Motor,
         "backlash" => Subsystem::Gearbox,
         "cable_stretch" | "cable_hysteresis" | "cable_creep" | "load_dependent_friction" => Subsystem::Cable,
         "joint_coupling" | "transmission_ratio" | "pulley_eccentricity" => Subsystem::Pulley,

@@ -436,6 +436,11 @@ impl Candidate {
         friction::is_a_spike(&self.family, &self.shape)
     }
 
+    /// Is it the inertia of a drive, not of a link?
+    pub(crate) fn is_of_a_drive(&self) -> bool {
+        self.family.form == ROTOR
+    }
+
     /// Is it friction by load with a level of dry friction beside?
     pub fn is_by_load_and_level(&self) -> bool {
         self.family.physics == "load_dependent_friction" && self.columns.len() > 1

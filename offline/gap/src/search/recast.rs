@@ -1,7 +1,7 @@
 //! Two effects that are one, and one that is two: what was taken one by one may be said better otherwise, where no single swap leads there.
 
 use super::{Beyond, Effect, Scored, Search};
-use crate::hypothesis::{Candidate, ROTOR, UNMODELLED};
+use crate::hypothesis::{Candidate, UNMODELLED};
 
 /// What another set of as many effects has to be better by, nats; and the share of what those chosen predict by which fewer may be behind: a law's form
 /// is not known better.
@@ -61,9 +61,9 @@ impl Search<'_, '_> {
 
     /// For the inertia of a link, or a weight on one, those of two drives, of which its own may be one: a link loads the joints before it as well.
     fn drives_for_a_link(&self, chosen: &[Candidate]) -> Vec<Vec<Candidate>> {
-        let drive = |joint: usize| self.candidates.iter().find(|c| c.family.form == ROTOR && c.family.joints == [joint]);
+        let drive = |joint: usize| self.candidates.iter().find(|c| c.is_of_a_drive() && c.family.joints == [joint]);
         let link_of = |own: &Candidate| match (own.family.physics, own.family.joints.first()) {
-            _ if own.windows.is_some() || own.family.form == ROTOR => None,
+            _ if own.windows.is_some() || own.is_of_a_drive() => None,
             ("link_inertia", link) => link.copied(),
             ("payload", _) => Some(own.shape_of("link").map_or(self.problem.robot.joint_count() - 1, |link| link as usize)),
             _ => None,
@@ -72,7 +72,7 @@ impl Search<'_, '_> {
         for (own, link) in chosen.iter().filter_map(|own| Some((own, link_of(own)?))) {
             for before in 0..link {
                 let rest = chosen.iter().filter(|other| !other.same_claim(own)).cloned();
-                let there = |joint: &usize| !chosen.iter().any(|c| c.family.form == ROTOR && c.family.joints == [*joint]);
+                let there = |joint: &usize| !chosen.iter().any(|c| c.is_of_a_drive() && c.family.joints == [*joint]);
                 let drives = [before, link].into_iter().filter(there).filter_map(drive).cloned();
                 sets.push(rest.chain(drives).collect());
             }

@@ -1,7 +1,7 @@
 //! What was chosen, held against everything else in its place: swapped, or dropped.
 
 use super::{Effect, Judged, Scored, Search, describe, price};
-use crate::hypothesis::{Candidate, ROTOR};
+use crate::hypothesis::Candidate;
 
 /// What may stand in an effect's place beside the others: all, the first of it, and what of it is acceptable.
 struct Place {
@@ -76,8 +76,7 @@ impl Search<'_, '_> {
         let base = self.grams(others, None);
         let mut ranked = self.rank(others);
         // Claims that stand beside are not also rivals; a link and its drive are one claim, and may both be there.
-        let is_drive = |c: &Candidate| c.family.form == ROTOR;
-        let there = |c: &Candidate| others.iter().any(|o| o.same_claim(c) && is_drive(o) == is_drive(c));
+        let there = |c: &Candidate| others.iter().any(|o| o.same_claim(c) && o.is_of_a_drive() == c.is_of_a_drive());
         ranked.retain(|r| !there(&r.candidate));
         let Some(first) = ranked.first() else { return Place { ranked, first: None, accepted: None } };
         let judged = self.judged(&base, others, first);
