@@ -27,8 +27,9 @@ fn main() {
     for cell in &problem.cells {
         println!("{:?} {} rows {} rms {:.3e}", cell.channel, cell.index + 1, cell.rows.len(), rms(cell.residual.iter().copied()));
     }
-    let dictionary = gap::hypothesis::Dictionary::new(&problem);
-    let answer = gap::search::search(&problem, &dictionary, &gap::search::Thresholds::default(), &mut |line| println!("{line}"));
+    let mut dictionary = gap::hypothesis::Dictionary::new(&problem);
+    let answer =
+        gap::search::search(&problem, &mut dictionary, &gap::search::Thresholds::default(), &mut |line| println!("{line}"));
     println!("{} effects", answer.effects.len());
     for effect in &answer.effects {
         println!("{} share {:.3}", gap::search::describe(&effect.chosen), effect.share);

@@ -46,7 +46,7 @@ fn main() {
         let sims: Vec<Motion> = pairs.iter().filter_map(|p| p.sim.clone()).collect();
         let nominal = Nominal::learn(&robot, &sims);
         let problem = Problem::new(&robot, &nominal, &pairs, 2.0);
-        let dictionary = Dictionary::new(&problem);
+        let mut dictionary = Dictionary::new(&problem);
         if verbose {
             println!("compliance {:?}", nominal.compliance);
             if let Ok(path) = std::env::var("DUMP") {
@@ -71,7 +71,7 @@ fn main() {
                 println!("{:?} {} rms {:.3e}", cell.channel, cell.index + 1, gap::series::rms(cell.residual.iter().copied()));
             }
         }
-        let mut answer = search(&problem, &dictionary, &Thresholds::default(), &mut |line| {
+        let mut answer = search(&problem, &mut dictionary, &Thresholds::default(), &mut |line| {
             if verbose {
                 println!("{line}");
             }

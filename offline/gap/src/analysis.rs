@@ -13,7 +13,7 @@ use crate::found::{Found, Outcome};
 use crate::gates;
 use crate::given::{Given, Options};
 use crate::held_out::{HeldOut, beside, left, sized};
-use crate::hypothesis::{Dictionary, LATE_TORQUES};
+use crate::hypothesis::{Dictionary, LATE_TORQUES, besides};
 use crate::intervals::estimates;
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
@@ -411,14 +411,14 @@ fn analyse_with(
     if robot.simulates_itself {
         problem.beyond_the_cycle();
     }
-    let dictionary = Dictionary::new(&problem);
+    let mut dictionary = Dictionary::new(&problem);
     let read_s = begun.elapsed().as_secs_f64();
     progress("searching the library");
     // Points have offset, play and coupling on every joint, and nothing else.
     let effects =
         if problem.of_points() { robot.joint_count().max(options.thresholds.effects) } else { options.thresholds.effects };
     let thresholds = Thresholds { effects, ..options.thresholds };
-    let mut answer = search(&problem, &dictionary, &thresholds, &mut |line| {
+    let mut answer = search(&problem, &mut dictionary, &thresholds, &mut |line| {
         if options.trace {
             // Nobody may listen any more.
             let _ = writeln!(std::io::stderr(), "{line}");
@@ -427,9 +427,13 @@ fn analyse_with(
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
     let held_problem = prior.put_on(Problem::new(&robot, &nominal, &held, BLOCK_S));
-    let held_dictionary = Dictionary::new(&held_problem);
+    let mut held_dictionary = Dictionary::new(&held_problem);
     let sizes = |answer: &Answer| estimates(&dictionary, &answer.scorer, &nominal, &robot, &answer.effects);
     let mut estimates = sizes(&answer);
+    let (there, _) =
+        HeldOut { problem: &problem, dictionary: &held_dictionary, floors: &floors }.there(&sized(&answer.effects, &estimates));
+    let asked = besides(&held_dictionary, there.iter().zip(estimates.iter().map(|estimate| &estimate.coefficients[..])));
+    held_dictionary.bear(asked, |_| 1.0);
     let held_out = HeldOut { problem: &problem, dictionary: &held_dictionary, floors: &floors };
     let refused = held_out.judge(&mut answer, &mut estimates, &sizes, &thresholds);
     let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);

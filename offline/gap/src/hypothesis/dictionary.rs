@@ -82,6 +82,25 @@ impl Column {
     }
 }
 
+/// A torque of each joint, at the grid; none: no torque.
+pub(crate) type Torques = Vec<Option<Vec<f64>>>;
+
+/// What joints are asked for beside what is believed of them.
+#[derive(Debug, Clone)]
+pub(crate) struct Besides {
+    /// What bodies and forces ask, which cables bear.
+    pub(crate) of_links: Torques,
+    /// What all that the motors give for asks, the former too.
+    pub(crate) of_all: Torques,
+}
+
+impl Besides {
+    /// Nothing of so many joints.
+    pub(crate) fn none(joints: usize) -> Self {
+        Self { of_links: vec![None; joints], of_all: vec![None; joints] }
+    }
+}
+
 /// Series at the rows that all joint cells share (the grid), and at those of the tip.
 pub struct Dictionary<'a> {
     /// The residuals.
@@ -97,6 +116,7 @@ pub struct Dictionary<'a> {
     /// Row of the grid that is nearest to each of the tip's.
     tip_places: Vec<usize>,
     cable_loads: Vec<OnceLock<Vec<f64>>>,
+    besides: Besides,
     pub(super) signs: Signs,
     regressor: OnceLock<Vec<Vec<f64>>>,
     links: OnceLock<[Vec<Vec<f64>>; 2]>,
@@ -133,6 +153,7 @@ impl<'a> Dictionary<'a> {
             tip_rows,
             strain_shares,
             cable_loads: vec![OnceLock::new(); n],
+            besides: Besides::none(n),
             signs: Signs::default(),
             regressor: OnceLock::new(),
             links: OnceLock::new(),
@@ -184,9 +205,22 @@ impl<'a> Dictionary<'a> {
         (high - low).max(1e-9)
     }
 
+    /// What is borne and given from now on beside what is believed: columns that depend on a load have to be made anew. Of what a motor gives the
+    /// weight of its joint is of the new, the rest of what was given so far.
+    pub(crate) fn bear(&mut self, besides: Besides, weight_of_new: impl Fn(usize) -> f64) {
+        let before = std::mem::replace(&mut self.besides, besides).of_all;
+        for (joint, before) in before.into_iter().enumerate() {
+            let new = weight_of_new(joint);
+            let given = &mut self.besides.of_all[joint];
+            *given = weighted(&|k| [new, 1.0 - new][k], &[given.take(), before]);
+        }
+        self.cable_loads = vec![OnceLock::new(); self.joints()];
+    }
+
     /// Load of a joint at the grid: what its links ask of the drives.
     pub fn load(&self, joint: usize) -> Vec<f64> {
-        self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint])
+        let of_links = self.at_grid(|r, _, k| self.problem.loads[r][k].link[joint]);
+        plus(of_links, self.besides.of_links[joint].as_deref())
     }
 
     /// What the links ask for more, per unit of it, where joints are elsewhere and move otherwise than their motors say: by so much position,
@@ -267,13 +301,16 @@ impl<'a> Dictionary<'a> {
     /// Load on the cable of a drive at the grid, `f = C⁻ᵀ τ`: one that passes other joints bears no part of theirs, but they of its own.
     pub fn cable_load(&self, drive: usize) -> &[f64] {
         self.cable_loads[drive].get_or_init(|| {
-            self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].link) + self.problem.shaking[r].borne(drive, k))
+            let of_links = self
+                .at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].link) + self.problem.shaking[r].borne(drive, k));
+            plus(of_links, weighted(&|joint| self.strain_shares[(joint, drive)], &self.besides.of_links).as_deref())
         })
     }
 
-    /// What a drive has to give in all but dry friction, at the grid.
+    /// What a drive has to give in all but the dry friction that is believed of it, at the grid.
     pub fn drive_torque(&self, drive: usize) -> Vec<f64> {
-        self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].motor))
+        let of_all = self.at_grid(|r, _, k| self.carried(drive, &self.problem.loads[r][k].motor));
+        plus(of_all, weighted(&|joint| self.strain_shares[(joint, drive)], &self.besides.of_all).as_deref())
     }
 
     /// What torques at the joints ask of the cable of a drive.
@@ -303,7 +340,7 @@ impl<'a> Dictionary<'a> {
 
     /// Deflections of the joints by torques at them: each loads the cables that hold it, `f = C⁻ᵀ τ`, those give way by their compliance, and
     /// `A⁻¹ m` takes that for motion of every joint that is read through them, `C⁻¹`.
-    fn stretched_by(&self, torques: &[Option<Vec<f64>>]) -> Vec<Option<Vec<f64>>> {
+    fn stretched_by(&self, torques: &[Option<Vec<f64>>]) -> Torques {
         let shares = &self.strain_shares;
         let compliance = |drive: usize| self.problem.nominal.compliance[drive][0];
         let strain = |drive: usize| weighted(&|joint| compliance(drive) * shares[(joint, drive)], torques);
@@ -311,7 +348,7 @@ impl<'a> Dictionary<'a> {
     }
 
     /// Deflections of the joints by strains of the drives' cables: joints whose position is read through others' cables see their share.
-    fn read_through(&self, strains: &[Option<Vec<f64>>]) -> Vec<Option<Vec<f64>>> {
+    fn read_through(&self, strains: &[Option<Vec<f64>>]) -> Torques {
         (0..self.joints()).map(|joint| weighted(&|drive| self.strain_shares[(joint, drive)], strains)).collect()
     }
 
@@ -382,6 +419,12 @@ impl<'a> Dictionary<'a> {
 /// Two series, row by row.
 pub(super) fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+/// A series with what is there besides.
+fn plus(mut series: Vec<f64>, besides: Option<&[f64]>) -> Vec<f64> {
+    series.iter_mut().zip(besides.into_iter().flatten()).for_each(|(x, more)| *x += more);
+    series
 }
 
 /// A series with the other sign.

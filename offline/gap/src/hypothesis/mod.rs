@@ -23,6 +23,7 @@ pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 
 use std::sync::Arc;
 
+use dictionary::{Besides, Torques};
 pub use dictionary::{Column, Dictionary};
 pub(crate) use environment::WALL;
 pub use environment::direction;
@@ -295,6 +296,9 @@ impl Family {
     }
 }
 
+/// What rubs.
+const RUBS: [&str; 5] = ["coulomb_friction", "viscous_friction", "stribeck_friction", "load_dependent_friction", "thermal_drift"];
+
 /// Not tried in windows: a curve at slow speed, in a window, passes for the force at one standstill.
 const ALL_THE_TIME: [&str; 1] = ["stribeck_friction"];
 
@@ -323,17 +327,44 @@ impl Candidate {
     /// Makes the columns.
     pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], windows: Option<&Windows>) -> Self {
         let made = |make: &Columns| {
-            let mut columns = make(dictionary, shape);
+            let mut columns = made(dictionary, make, shape, windows);
             for column in &mut columns {
                 column.silence(dictionary.problem);
-                if let Some(windows) = windows {
-                    *column = column.within(dictionary.problem, windows);
-                }
             }
             Arc::new(columns)
         };
         let apart = family.apart.as_ref().map_or_else(Arc::default, |parts| made(&**parts));
         Self { family: family.clone(), shape: shape.to_vec(), windows: windows.cloned(), columns: made(&*family.columns), apart }
+    }
+
+    /// The same with what a dictionary bears now, refined by none.
+    #[must_use]
+    pub(crate) fn anew(&self, dictionary: &Dictionary) -> Self {
+        Self::new(dictionary, &self.family, &self.shape, self.windows.as_ref())
+    }
+
+    /// Is it borne by cables as the links are?
+    fn is_borne(&self) -> bool {
+        CARRIED.contains(&self.family.physics) && !self.is_of_a_drive()
+    }
+
+    /// Is it what a motor has to give for?
+    fn is_given(&self) -> bool {
+        CARRIED.contains(&self.family.physics) || RUBS.contains(&self.family.physics) || self.family.physics == RIPPLE
+    }
+
+    /// What it asks of the joints for given coefficients, where nothing is known of their torque too.
+    fn asks(&self, dictionary: &Dictionary, coefficients: &[f64], of: &mut Torques) {
+        let columns = made(dictionary, &*self.family.columns, &self.shape, self.windows.as_ref());
+        for (column, theta) in columns.iter().zip(coefficients) {
+            for (joint, torque) in of.iter_mut().enumerate() {
+                let cell = dictionary.problem.cell(Channel::JointTorque, joint);
+                for (_, values) in column.parts.iter().filter(|(c, _)| Some(*c) == cell) {
+                    let torque = torque.get_or_insert_with(|| vec![0.0; values.len()]);
+                    torque.iter_mut().zip(values).for_each(|(torque, x)| *torque += theta * f64::from(*x));
+                }
+            }
+        }
     }
 
     /// Numbers of its windows that lie in the runs.
@@ -460,6 +491,27 @@ impl Candidate {
     pub fn same_claim(&self, other: &Self) -> bool {
         self.family.physics == other.family.physics && self.family.joints == other.family.joints
     }
+}
+
+/// Columns of a shape, within windows.
+fn made(dictionary: &Dictionary, make: &Columns, shape: &[f64], windows: Option<&Windows>) -> Vec<Column> {
+    let columns = make(dictionary, shape);
+    let Some(windows) = windows else { return columns };
+    columns.iter().map(|column| column.within(dictionary.problem, windows)).collect()
+}
+
+/// What some effects, each with its coefficients, ask beside what is believed.
+pub(crate) fn besides<'a>(dictionary: &Dictionary, effects: impl IntoIterator<Item = (&'a Candidate, &'a [f64])>) -> Besides {
+    let mut all = Besides::none(dictionary.joints());
+    for (own, coefficients) in effects {
+        if own.is_borne() {
+            own.asks(dictionary, coefficients, &mut all.of_links);
+        }
+        if own.is_given() {
+            own.asks(dictionary, coefficients, &mut all.of_all);
+        }
+    }
+    all
 }
 
 /// Every form of every physics that the residuals can show.

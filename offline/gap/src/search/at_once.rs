@@ -1,6 +1,8 @@
 //! Shapes whose numbers are refined all at once: those of a memory depend on each other.
 
-use super::{AHEAD, Scored, Search, keep_better, simpler_is_enough};
+use super::likeliest::simpler_is_enough;
+use super::rank::keep_better;
+use super::{AHEAD, Scored, Search};
 use crate::hypothesis::{Candidate, Column, Windows};
 use crate::intervals::slopes_of;
 use crate::parallel;

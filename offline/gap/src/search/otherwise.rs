@@ -1,7 +1,8 @@
 //! The search, begun again with another effect first. What explains most by itself may be neither of two effects that are there: a step and a
 //! slow drift look like a cable that creeps, and what is beside that then explains little.
 
-use super::{Beyond, Effect, Scored, Search, price, resolution};
+use super::judged::resolution;
+use super::{Beyond, Effect, Scored, Search, price};
 use crate::floors::floor;
 use crate::hypothesis::Candidate;
 use crate::series::rms;

@@ -1,6 +1,7 @@
 //! What was chosen, held against everything else in its place: swapped, or dropped.
 
-use super::{Effect, Judged, Scored, Search, describe, price};
+use super::judged::Judged;
+use super::{Effect, Scored, Search, describe, price};
 use crate::hypothesis::Candidate;
 
 /// What may stand in an effect's place beside the others: all, the first of it, and what of it is acceptable.

@@ -1,0 +1,85 @@
+//! What was found is borne as the links are: a weight stretches a soft cable, and loads what rubs by its load; and a motor that gives too little has to
+//! give for all of it. Effects are first sized by what is believed alone, and anew by all once it is known.
+
+use super::{Effect, Search, Thresholds};
+use crate::hypothesis::{Candidate, Dictionary, besides, torque_scale};
+use crate::score::Scorer;
+
+/// Most times that sizes are found anew with what is borne, which depends on them, and the share of each by which it is then known.
+const TIMES: usize = 12;
+const KNOWN: f64 = 1e-3;
+/// Times that shapes are found anew with it.
+const SHAPES: usize = 2;
+
+/// Sizes and shapes of effects by all that is borne, which the dictionary bears from then on. What bears nothing stays as it is.
+pub(super) fn bear<'p>(
+    dictionary: &mut Dictionary<'p>,
+    mut scorer: Scorer<'p>,
+    thresholds: Thresholds,
+    effects: &mut [Effect],
+) -> Scorer<'p> {
+    if effects.len() < 2 {
+        return scorer;
+    }
+    let mut chosen: Vec<Candidate> = effects.iter().map(|effect| effect.chosen.candidate.clone()).collect();
+    for _ in 0..SHAPES {
+        let changed = loaded(dictionary, &scorer, &mut chosen);
+        if changed.is_empty() {
+            break;
+        }
+        let search = Search { problem: dictionary.problem, dictionary, scorer, candidates: Vec::new(), thresholds };
+        for k in changed {
+            let others = search.grams(&chosen, Some(k));
+            chosen[k] = search.refined(&others, &chosen[k]);
+        }
+        scorer = search.scorer;
+    }
+    let sizes = sizes(&scorer, &chosen);
+    for ((effect, candidate), coefficients) in effects.iter_mut().zip(chosen).zip(sizes) {
+        (effect.chosen.candidate, effect.chosen.coefficients) = (candidate, coefficients);
+    }
+    scorer
+}
+
+/// Makes columns anew until what is borne agrees with the sizes; which of them depend on it.
+fn loaded(dictionary: &mut Dictionary, scorer: &Scorer, chosen: &mut [Candidate]) -> Vec<usize> {
+    let mut changed = Vec::new();
+    let mut before = sizes(scorer, chosen);
+    for _ in 0..TIMES {
+        let all = || chosen.iter().zip(before.iter().map(Vec::as_slice));
+        // Of what a weak motor gives for, it is asked for more than that: for what was found and is not in its own column yet, by its scale.
+        let scale = |joint: usize| {
+            let of = |(own, theta): (&Candidate, &[f64])| {
+                (own.family.joints == [joint]).then(|| torque_scale(&own.family, theta)).flatten()
+            };
+            all().find_map(of).unwrap_or(1.0)
+        };
+        dictionary.bear(besides(dictionary, all()), scale);
+        for (k, own) in chosen.iter_mut().enumerate() {
+            let anew = own.anew(dictionary);
+            if anew.shows() && anew.columns != own.columns {
+                *own = anew;
+                if !changed.contains(&k) {
+                    changed.push(k);
+                }
+            }
+        }
+        if changed.is_empty() {
+            break;
+        }
+        let after = sizes(scorer, chosen);
+        let is_known = |(before, after): (&f64, &f64)| (after - before).abs() <= KNOWN * after.abs();
+        let done = before.iter().flatten().zip(after.iter().flatten()).all(is_known);
+        before = after;
+        if done {
+            break;
+        }
+    }
+    changed
+}
+
+/// Coefficients of each of some candidates, beside the others.
+fn sizes(scorer: &Scorer, chosen: &[Candidate]) -> Vec<Vec<f64>> {
+    let mut all = scorer.fit(&scorer.grams(chosen)).coefficients.into_iter();
+    chosen.iter().map(|own| all.by_ref().take(own.columns.len()).collect()).collect()
+}
