@@ -107,7 +107,15 @@ pub struct Answer<'a> {
     pub scorer: Scorer<'a>,
 }
 
-impl Answer<'_> {
+impl<'a> Answer<'a> {
+    /// The same, its sizes by what is borne of those effects that are still there.
+    #[must_use]
+    pub(crate) fn bearing(mut self, dictionary: &mut Dictionary<'a>, thresholds: &Thresholds) -> Self {
+        self.scorer = borne::bear(dictionary, self.scorer, *thresholds, &mut self.effects);
+        self.fit_anew();
+        self
+    }
+
     /// Takes an effect back that was accepted; the last of them is then the best that was not.
     pub fn take_back(&mut self, effect: usize) -> Effect {
         let taken = self.effects.remove(effect);

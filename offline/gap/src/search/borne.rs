@@ -18,9 +18,6 @@ pub(super) fn bear<'p>(
     thresholds: Thresholds,
     effects: &mut [Effect],
 ) -> Scorer<'p> {
-    if effects.len() < 2 {
-        return scorer;
-    }
     let mut chosen: Vec<Candidate> = effects.iter().map(|effect| effect.chosen.candidate.clone()).collect();
     for _ in 0..SHAPES {
         let changed = loaded(dictionary, &scorer, &mut chosen);
