@@ -182,7 +182,7 @@ struct Search<'p, 'd> {
     thresholds: Thresholds,
 }
 
-/// Searches.
+/// Searches. The dictionary bears what is found from then on: columns that are made of it are loaded by that.
 pub fn search<'p>(
     problem: &'p Problem<'p>,
     dictionary: &mut Dictionary<'p>,

@@ -6,8 +6,10 @@ use crate::hypothesis::{Candidate, Dictionary, besides, torque_scale};
 use crate::score::Scorer;
 
 /// Most times that sizes are found anew with what is borne, which depends on them, and the share of each by which it is then known.
-const TIMES: usize = 12;
+const TIMES: usize = 24;
 const KNOWN: f64 = 1e-3;
+/// Of what a motor gives for, most that is taken of the new: from 2 on what other joints tell, a weight, would never settle.
+const MOST_OF_NEW: f64 = 1.5;
 /// Times that shapes are found anew with it.
 const SHAPES: usize = 2;
 
@@ -49,7 +51,7 @@ fn loaded(dictionary: &mut Dictionary, scorer: &Scorer, chosen: &mut [Candidate]
             let of = |(own, theta): (&Candidate, &[f64])| {
                 (own.family.joints == [joint]).then(|| torque_scale(&own.family, theta)).flatten()
             };
-            all().find_map(of).unwrap_or(1.0)
+            all().find_map(of).unwrap_or(1.0).min(MOST_OF_NEW)
         };
         dictionary.bear(besides(dictionary, all()), scale);
         for (k, own) in chosen.iter_mut().enumerate() {
