@@ -13,7 +13,7 @@ use crate::found::{Found, Outcome};
 use crate::gates;
 use crate::given::{Given, Options};
 use crate::held_out::{HeldOut, beside, left, sized};
-use crate::hypothesis::{Dictionary, LATE_TORQUES, besides};
+use crate::hypothesis::{Candidate, Dictionary, LATE_TORQUES, besides};
 use crate::intervals::{Estimate, estimates};
 use crate::motion::{Band, Motion};
 use crate::nominal::Nominal;
@@ -437,14 +437,15 @@ fn analyse_with(
         held.bear(besides(held, there.iter().zip(all.iter().map(|(_, coefficients)| *coefficients))), |_| 1.0);
     };
     bear_there(&mut held_dictionary, &answer, &estimates);
-    let said = claims(&answer);
+    let said: Vec<Candidate> = answer.effects.iter().map(|effect| effect.chosen.candidate.clone()).collect();
     let refused = HeldOut { problem: &problem, dictionary: &held_dictionary, floors: &floors }.judge(
         &mut answer,
         &mut estimates,
         &|answer| sizes(&dictionary, answer),
         &thresholds,
     );
-    if claims(&answer) != said {
+    let stays = |(own, effect): (&Candidate, &Effect)| own.same_form(&effect.chosen.candidate);
+    if said.len() != answer.effects.len() || !said.iter().zip(&answer.effects).all(stays) {
         // What was taken back is borne no more, and what came in its place bears the others.
         answer = answer.bearing(&mut dictionary, &thresholds);
         estimates = sizes(&dictionary, &answer);
@@ -526,11 +527,6 @@ fn analyse_with(
     outcome.report.timing.total_s = begun.elapsed().as_secs_f64();
     outcome.report.timing.threads = u64::try_from(parallel::cores()).ok();
     Ok(outcome)
-}
-
-/// What is said: physics, joints and form of each effect.
-fn claims(answer: &Answer) -> Vec<String> {
-    answer.effects.iter().map(|effect| format!("{:?}", effect.chosen.candidate.family)).collect()
 }
 
 /// Is the torque of a run that of rigid bodies with drives, as a simulator's is but for its noise?

@@ -108,7 +108,7 @@ pub struct Answer<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// The same, its sizes by what is borne of those effects that are still there.
+    /// The same, its sizes by what is borne of the effects that are there.
     #[must_use]
     pub(crate) fn bearing(mut self, dictionary: &mut Dictionary<'a>, thresholds: &Thresholds) -> Self {
         self.scorer = borne::bear(dictionary, self.scorer, *thresholds, &mut self.effects);
@@ -203,11 +203,8 @@ pub fn search<'p>(
     if let Some((_, of_others, beyond)) = search.recast(&chosen, trace) {
         (effects, next) = (of_others, beyond);
     }
-    let mut scorer = borne::bear(dictionary, search.scorer, *thresholds, &mut effects);
-    let grams = scorer.grams(effects.iter().map(|effect| &effect.chosen.candidate));
-    let fit = scorer.fit(&grams);
-    scorer.temper(&grams, &fit);
-    Answer { effects, grams, fit, none, next, scorer }
+    let (grams, fit) = (search.scorer.empty(), none.clone());
+    Answer { effects, grams, fit, none, next, scorer: search.scorer }.bearing(dictionary, thresholds)
 }
 
 impl Search<'_, '_> {

@@ -427,6 +427,13 @@ fn plus(mut series: Vec<f64>, besides: Option<&[f64]>) -> Vec<f64> {
     series
 }
 
+/// Adds torques, joint by joint; empty: none.
+pub(super) fn add(torques: &mut Torques, more: &[Vec<f64>]) {
+    for (torque, more) in torques.iter_mut().zip(more).filter(|(_, more)| !more.is_empty()) {
+        *torque = Some(plus(more.clone(), torque.as_deref()));
+    }
+}
+
 /// A series with the other sign.
 pub(super) fn minus(a: &[f64]) -> Vec<f64> {
     a.iter().map(|x| -x).collect()

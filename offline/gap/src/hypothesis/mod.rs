@@ -23,7 +23,7 @@ pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
 
 use std::sync::Arc;
 
-use dictionary::{Besides, Torques};
+use dictionary::Besides;
 pub use dictionary::{Column, Dictionary};
 pub(crate) use environment::WALL;
 pub use environment::direction;
@@ -326,15 +326,21 @@ pub struct Candidate {
 impl Candidate {
     /// Makes the columns.
     pub fn new(dictionary: &Dictionary, family: &Arc<Family>, shape: &[f64], windows: Option<&Windows>) -> Self {
-        let made = |make: &Columns| {
+        let silenced = |make: &Columns| {
             let mut columns = made(dictionary, make, shape, windows);
             for column in &mut columns {
                 column.silence(dictionary.problem);
             }
             Arc::new(columns)
         };
-        let apart = family.apart.as_ref().map_or_else(Arc::default, |parts| made(&**parts));
-        Self { family: family.clone(), shape: shape.to_vec(), windows: windows.cloned(), columns: made(&*family.columns), apart }
+        let apart = family.apart.as_ref().map_or_else(Arc::default, |parts| silenced(&**parts));
+        Self {
+            family: family.clone(),
+            shape: shape.to_vec(),
+            windows: windows.cloned(),
+            columns: silenced(&*family.columns),
+            apart,
+        }
     }
 
     /// The same with what a dictionary bears now, refined by none.
@@ -353,18 +359,11 @@ impl Candidate {
         CARRIED.contains(&self.family.physics) || RUBS.contains(&self.family.physics) || self.family.physics == RIPPLE
     }
 
-    /// What it asks of the joints for given coefficients, where nothing is known of their torque too.
-    fn asks(&self, dictionary: &Dictionary, coefficients: &[f64], of: &mut Torques) {
+    /// Torques that it asks of the joints for given coefficients, where nothing is known of theirs too; empty where it asks none.
+    fn asks(&self, dictionary: &Dictionary, coefficients: &[f64]) -> Vec<Vec<f64>> {
         let columns = made(dictionary, &*self.family.columns, &self.shape, self.windows.as_ref());
-        for (column, theta) in columns.iter().zip(coefficients) {
-            for (joint, torque) in of.iter_mut().enumerate() {
-                let cell = dictionary.problem.cell(Channel::JointTorque, joint);
-                for (_, values) in column.parts.iter().filter(|(c, _)| Some(*c) == cell) {
-                    let torque = torque.get_or_insert_with(|| vec![0.0; values.len()]);
-                    torque.iter_mut().zip(values).for_each(|(torque, x)| *torque += theta * f64::from(*x));
-                }
-            }
-        }
+        let cell = |joint| dictionary.problem.cell(Channel::JointTorque, joint);
+        (0..dictionary.joints()).map(|joint| cell(joint).map_or_else(Vec::new, |c| summed(&columns, c, coefficients))).collect()
     }
 
     /// Numbers of its windows that lie in the runs.
@@ -392,14 +391,7 @@ impl Candidate {
 
     /// The effect in a cell for given coefficients; empty where it has none.
     pub fn effect(&self, cell: usize, coefficients: &[f64]) -> Vec<f64> {
-        let mut sum: Vec<f64> = Vec::new();
-        for (column, theta) in self.columns.iter().zip(coefficients) {
-            for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
-                sum.resize(values.len(), 0.0);
-                sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * f64::from(*x));
-            }
-        }
-        sum
+        summed(&self.columns, cell, coefficients)
     }
 
     /// Takes the effect in a cell off a series.
@@ -500,16 +492,27 @@ fn made(dictionary: &Dictionary, make: &Columns, shape: &[f64], windows: Option<
     columns.iter().map(|column| column.within(dictionary.problem, windows)).collect()
 }
 
+/// What columns are together in a cell, each times its coefficient; empty where they are not.
+fn summed(columns: &[Column], cell: usize, coefficients: &[f64]) -> Vec<f64> {
+    let mut sum: Vec<f64> = Vec::new();
+    for (column, theta) in columns.iter().zip(coefficients) {
+        for (_, values) in column.parts.iter().filter(|(c, _)| *c == cell) {
+            sum.resize(values.len(), 0.0);
+            sum.iter_mut().zip(values).for_each(|(s, x)| *s += theta * f64::from(*x));
+        }
+    }
+    sum
+}
+
 /// What some effects, each with its coefficients, ask beside what is believed.
 pub(crate) fn besides<'a>(dictionary: &Dictionary, effects: impl IntoIterator<Item = (&'a Candidate, &'a [f64])>) -> Besides {
     let mut all = Besides::none(dictionary.joints());
-    for (own, coefficients) in effects {
+    for (own, coefficients) in effects.into_iter().filter(|(own, _)| own.is_given()) {
+        let asked = own.asks(dictionary, coefficients);
         if own.is_borne() {
-            own.asks(dictionary, coefficients, &mut all.of_links);
+            dictionary::add(&mut all.of_links, &asked);
         }
-        if own.is_given() {
-            own.asks(dictionary, coefficients, &mut all.of_all);
-        }
+        dictionary::add(&mut all.of_all, &asked);
     }
     all
 }
