@@ -430,8 +430,36 @@ pub(crate) fn asked(table: &Table, waits: &[&str]) -> Table {
 /// Name of the row of [`hop`].
 pub(crate) const HOP: &str = "one hop through shared memory, half of there and back";
 
+/// Real-time throttling off for as long as this lives, as a thread that spins needs it (docs/machine.md): what it was comes back.
+struct Unthrottled {
+    before: String,
+}
+
+impl Unthrottled {
+    const SETTING: &str = "/proc/sys/kernel/sched_rt_runtime_us";
+
+    /// None where it may not be changed.
+    fn new() -> Option<Self> {
+        let before = std::fs::read_to_string(Self::SETTING).ok()?;
+        std::fs::write(Self::SETTING, "-1\n").ok()?;
+        Some(Self { before })
+    }
+}
+
+impl Drop for Unthrottled {
+    fn drop(&mut self) {
+        if let Err(cause) = std::fs::write(Self::SETTING, &self.before) {
+            eprintln!("note: {} was {} and is -1 now: {cause}", Self::SETTING, self.before.trim());
+        }
+    }
+}
+
 /// Measures one way of waiting for `seconds`; adds its rows to the table.
 pub(crate) fn run(table: &mut Table, wait: &str, service_core: usize, seconds: u64) -> Result<(), String> {
+    let unthrottled = if wait == "spin" { Unthrottled::new() } else { None };
+    if wait == "spin" && unthrottled.is_none() {
+        println!("note: real-time throttling stays on: it stops a thread that spins for 50 ms of every second");
+    }
     let Some(mut measured) = measure(&format!("wait = \"{wait}\""), Arms::One, service_core, seconds)? else {
         table.row(&format!("{wait}: not measured, the machine stopped for too long"), &[f64::NAN; 5]);
         return Ok(());
