@@ -138,7 +138,8 @@ fn main() {
             })
             .collect();
         let _ = write!(line, " controller {:?}", gap::controller::changed(&problem, &[]));
-        let ceiling = gap::flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
+        let ceiling =
+            gap::flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none, Thresholds::default().nats);
         let _ = write!(
             line,
             " ceiling: library {:.0} together {:.0} least {:.0} cell {:?} by {:?}; left {}",

@@ -452,7 +452,7 @@ fn analyse_with(
         bear_there(&mut held_dictionary, &answer, &estimates);
     }
     let held_out = HeldOut { problem: &problem, dictionary: &held_dictionary, floors: &floors };
-    let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none);
+    let ceiling = flexible::ceiling(&dictionary, &mut answer.scorer, &answer.grams, &answer.none, thresholds.nats);
     let beyond = ceiling.together_nats - ceiling.library_nats;
     let unmodelled = beyond_recording(&problem, &answer, &ceiling)
         && ceiling.cell.is_none_or(|(c, _)| {

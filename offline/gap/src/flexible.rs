@@ -78,8 +78,9 @@ const STEP_NATS: f64 = 4.0;
 const FEATURES: usize = 6;
 
 /// Adds to a set the features that help, one after the other, cell by cell: what is held out decides, so that the ceiling
-/// does not rise by overfitting.
-pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none: &Fit) -> Ceiling {
+/// does not rise by overfitting. A cell that gains less than `least` nats gains nothing: the best of thirty features gains something in any, and a robot
+/// of six joints has fifteen.
+pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none: &Fit, least: f64) -> Ceiling {
     let problem = dictionary.problem;
     let library = scorer.fit(grams);
     let mut wide = grams.clone();
@@ -88,6 +89,7 @@ pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none
     let mut by_cell = vec![(0.0, Vec::new()); problem.cells.len()];
     for c in 0..problem.cells.len() {
         let mut columns = cell_columns(dictionary, c);
+        let before = (wide.clone(), together.clone());
         while by_cell[c].1.len() < FEATURES {
             let scored = columns.iter().enumerate().map(|(k, (_, column))| {
                 let fit = scorer.fit(&scorer.extended(&wide, std::slice::from_ref(column)));
@@ -99,6 +101,11 @@ pub fn ceiling(dictionary: &Dictionary, scorer: &mut Scorer, grams: &Grams, none
             together = scorer.fit(&wide);
             by_cell[c].0 += nats;
             by_cell[c].1.push(name);
+            scorer.temper(&wide, &together);
+        }
+        if by_cell[c].0 < least && !by_cell[c].1.is_empty() {
+            by_cell[c] = (0.0, Vec::new());
+            (wide, together) = before;
             scorer.temper(&wide, &together);
         }
     }

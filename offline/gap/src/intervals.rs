@@ -1,7 +1,8 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::hypothesis::{
-    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, rounds,
+    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, part, rounds,
+    rub_together,
 };
 use crate::nominal::Nominal;
 use crate::parallel;
@@ -84,6 +85,19 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("joint_offset" | "transmission_ratio" | "pulley_eccentricity", _) => 0.008,
         _ => 0.015,
     }
+}
+
+/// Of the other part of what rubs at a joint, as much as its form is not known by: a small part makes up for it (docs/decisions/0031).
+const OF_THE_OTHER_PART: f64 = 0.01;
+
+/// How much of a part of what rubs at a joint would fit the other part, alone.
+fn as_the_other_part(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
+    let (own, _) = candidates[k];
+    let others = candidates.iter().filter(|(other, _)| rub_together(own, other) && part(other) != part(own));
+    let product: f64 = others
+        .flat_map(|(other, theta)| other.columns.iter().zip(*theta).map(|(column, theta)| theta * own.columns[0].dot(column)))
+        .sum();
+    product / own.columns[0].dot(&own.columns[0]).max(1e-300)
 }
 
 /// The numbers that say how large an effect is, with what they are where there is none. Not of forms with other coefficients (a place, a
@@ -278,6 +292,9 @@ fn of_candidates(
     let mut grams = scorer.empty();
     let mut layout = Vec::new();
     let (mut start, mut column) = (0, 0);
+    let mut sizes = fit.coefficients.as_slice();
+    let sized: Vec<(&Candidate, &[f64])> =
+        candidates.iter().map(|own| (*own, sizes.split_off(..own.columns.len()).unwrap_or_default())).collect();
     for candidate in candidates {
         let theta = &fit.coefficients[start..start + candidate.columns.len()];
         start += theta.len();
@@ -294,7 +311,9 @@ fn of_candidates(
     candidates
         .iter()
         .zip(layout)
-        .map(|(candidate, (column, theta, which))| {
+        .enumerate()
+        .map(|(own, (candidate, (column, theta, which)))| {
+            let of_the_other = as_the_other_part(&sized, own);
             let of = |coefficients: &[f64]| -> Vec<Named> {
                 let own = &coefficients[column..column + theta.len()];
                 let mut shape = candidate.shape.clone();
@@ -324,7 +343,9 @@ fn of_candidates(
                 .map(|(k, named)| {
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
-                    let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name));
+                    let plain = matches!((physics, named.name), ("coulomb_friction", "f_c") | ("viscous_friction", "b"));
+                    let beside = if plain { OF_THE_OTHER_PART * of_the_other } else { 0.0 };
+                    let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name)).hypot(beside);
                     let [least, most] = possible(physics, form, named);
                     (
                         named.clone(),

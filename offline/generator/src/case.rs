@@ -39,6 +39,7 @@ impl Order {
         match self.robot {
             Kind::Raven => robots::raven(&mut random),
             Kind::Variant => robots::variant(&mut random),
+            Kind::Six => robots::six(&mut random),
         }
     }
 

@@ -40,8 +40,10 @@ pub enum Kind {
     /// The arm of data/gap-examples.
     #[default]
     Raven,
-    /// Any other, drawn at random.
+    /// Any other of two to four joints, drawn at random.
     Variant,
+    /// One of six joints, drawn at random.
+    Six,
 }
 
 /// A case that is asked for.

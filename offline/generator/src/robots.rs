@@ -94,8 +94,14 @@ pub fn raven(random: &mut Random) -> Pair {
     Pair { truth: deviate(&model, random), model }
 }
 
-/// Any other arm.
+/// Any other arm of two to four joints.
 pub fn variant(random: &mut Random) -> Pair {
     let model = crate::variants::draw(random);
+    Pair { truth: deviate(&model, random), model }
+}
+
+/// An arm of six joints.
+pub fn six(random: &mut Random) -> Pair {
+    let model = crate::variants::draw_sized(6, random);
     Pair { truth: deviate(&model, random), model }
 }

@@ -57,7 +57,8 @@ pub fn play(robot: &Robot, effects: &[Effect], trajectory: &Trajectory) -> Signa
         2 => play_sized::<2>(robot, effects, trajectory),
         3 => play_sized::<3>(robot, effects, trajectory),
         4 => play_sized::<4>(robot, effects, trajectory),
-        other => unreachable!("arms have 2 to 4 joints, not {other}"),
+        6 => play_sized::<6>(robot, effects, trajectory),
+        other => unreachable!("arms have 2 to 4 joints or 6, not {other}"),
     }
 }
 

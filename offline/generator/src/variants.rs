@@ -1,4 +1,4 @@
-//! Arms other than RAVEN: two to four joints, some sliding, any mount, masses and ratios.
+//! Arms other than RAVEN: two to four joints or six, some sliding, any mount, masses and ratios.
 
 use crate::arm::{Arm, Drive, DryLaw, Joint, Link, Motion};
 use crate::lagrange::Chain;
@@ -6,9 +6,14 @@ use crate::random::Random;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
-/// An arm as a laboratory describes it.
+/// An arm of two to four joints as a laboratory describes it.
 pub(crate) fn draw(random: &mut Random) -> Arm {
     let size = 2 + random.index(3);
+    draw_sized(size, random)
+}
+
+/// An arm of so many joints, four or six at most, as a laboratory describes it.
+pub(crate) fn draw_sized(size: usize, random: &mut Random) -> Arm {
     let sliding = if random.chance(0.5) { Some(random.index(size)) } else { None };
     let (mut joints, mut links) = (Vec::new(), Vec::new());
     let mut length = 0.0;
@@ -125,7 +130,8 @@ fn meets(arm: &Arm, q: &[f64]) -> Vec<(f64, f64)> {
     match arm.size() {
         2 => meets_sized::<2>(arm, q),
         3 => meets_sized::<3>(arm, q),
-        _ => meets_sized::<4>(arm, q),
+        4 => meets_sized::<4>(arm, q),
+        _ => meets_sized::<6>(arm, q),
     }
 }
 

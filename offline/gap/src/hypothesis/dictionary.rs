@@ -48,6 +48,14 @@ impl Column {
         self
     }
 
+    /// Sum of the products with another one, row by row.
+    pub(crate) fn dot(&self, other: &Self) -> f64 {
+        let both = self.parts.iter().filter_map(|(cell, own)| {
+            other.parts.binary_search_by_key(cell, |(cell, _)| *cell).ok().map(|at| (own, &other.parts[at].1))
+        });
+        both.map(|(a, b)| a.iter().zip(b).map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()).sum()
+    }
+
     /// Makes it 0 where a cell says nothing.
     pub fn silence(&mut self, problem: &Problem) {
         for (cell, values) in &mut self.parts {

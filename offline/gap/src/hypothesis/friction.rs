@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::dictionary::{Dictionary, size, times};
 use super::signs::{Place, Sign, Turn};
-use super::{Bound, Family, Valley, product};
+use super::{Bound, Candidate, Family, Valley, product};
 use crate::cell::Channel;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
@@ -42,7 +42,8 @@ const BEFORE_MOST: f64 = 0.5;
 /// Its name in a shape.
 pub(super) const BEFORE: &str = "before";
 
-const BY_LOAD: &str = "load_dependent_friction";
+/// Its name in the vocabulary.
+pub(crate) const BY_LOAD: &str = "load_dependent_friction";
 const STRIBECK: &str = "stribeck_friction";
 /// Forms of friction before a cable, and behind it: for any load, that of the links alone, and their weight.
 pub(crate) const AT_MOTOR: [&str; 3] = ["motor side", "motor side, by its links", "motor side, by their weight"];
@@ -50,6 +51,30 @@ const AT_LINK: [&str; 3] = ["link side", "link side, by its links", "link side, 
 
 /// A load of a joint at the grid.
 type LoadOf = fn(&Dictionary, usize) -> Vec<f64>;
+
+/// What rubs at a joint has two parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// It goes with the direction.
+    Dry,
+    /// It goes with the speed.
+    Viscous,
+}
+
+/// Which of them a candidate is.
+pub(crate) fn part(candidate: &Candidate) -> Option<Part> {
+    match candidate.family.physics {
+        "viscous_friction" => Some(Part::Viscous),
+        "coulomb_friction" | STRIBECK | BY_LOAD => Some(Part::Dry),
+        _ => None,
+    }
+}
+
+/// Do both rub at the same joint, and at the same time?
+pub(crate) fn rub_together(one: &Candidate, other: &Candidate) -> bool {
+    let both = part(one).is_some() && part(other).is_some();
+    both && one.family.joints == other.family.joints && one.windows == other.windows
+}
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     if !dictionary.problem.has(Channel::JointTorque) {

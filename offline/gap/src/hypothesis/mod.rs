@@ -15,6 +15,7 @@ mod unknown;
 mod windows;
 
 pub(crate) use actuation::{RIPPLE, shaken, torque_scale};
+pub(crate) use friction::{BY_LOAD, Part, part, rub_together};
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
@@ -466,7 +467,7 @@ impl Candidate {
 
     /// Is it friction by load with a level of dry friction beside?
     pub fn is_by_load_and_level(&self) -> bool {
-        self.family.physics == "load_dependent_friction" && self.columns.len() > 1
+        self.family.physics == BY_LOAD && self.columns.len() > 1
     }
 
     /// Are the two of the same form and shape?

@@ -13,31 +13,52 @@ const MOST_OF_NEW: f64 = 1.5;
 /// Times that shapes are found anew with it.
 const SHAPES: usize = 2;
 
-/// Sizes and shapes of effects by all that is borne, which the dictionary bears from then on. What bears nothing stays as it is.
+/// Sizes and shapes of effects by all that is borne, which the dictionary bears from then on; of them those are dropped that gain nothing any more.
+/// What bears nothing stays as it is.
 pub(super) fn bear<'p>(
     dictionary: &mut Dictionary<'p>,
     mut scorer: Scorer<'p>,
     thresholds: Thresholds,
-    effects: &mut [Effect],
+    effects: &mut Vec<Effect>,
 ) -> Scorer<'p> {
-    let mut chosen: Vec<Candidate> = effects.iter().map(|effect| effect.chosen.candidate.clone()).collect();
-    for _ in 0..SHAPES {
-        let changed = loaded(dictionary, &scorer, &mut chosen);
-        if changed.is_empty() {
-            break;
+    loop {
+        let mut chosen: Vec<Candidate> = effects.iter().map(|effect| effect.chosen.candidate.clone()).collect();
+        let mut bears = false;
+        for _ in 0..SHAPES {
+            let changed = loaded(dictionary, &scorer, &mut chosen);
+            if changed.is_empty() {
+                break;
+            }
+            bears = true;
+            let search = Search { problem: dictionary.problem, dictionary, scorer, candidates: Vec::new(), thresholds };
+            for k in changed {
+                let others = search.grams(&chosen, Some(k));
+                chosen[k] = search.refined(&others, &chosen[k]);
+            }
+            scorer = search.scorer;
         }
-        let search = Search { problem: dictionary.problem, dictionary, scorer, candidates: Vec::new(), thresholds };
-        for k in changed {
-            let others = search.grams(&chosen, Some(k));
-            chosen[k] = search.refined(&others, &chosen[k]);
-        }
+        let mut search = Search { problem: dictionary.problem, dictionary, scorer, candidates: Vec::new(), thresholds };
+        let needless = if bears { search.needless(&chosen) } else { None };
         scorer = search.scorer;
+        if let Some(needless) = needless {
+            effects.remove(needless);
+            continue;
+        }
+        let sizes = sizes(&scorer, &chosen);
+        for ((effect, candidate), coefficients) in effects.iter_mut().zip(chosen).zip(sizes) {
+            (effect.chosen.candidate, effect.chosen.coefficients) = (candidate, coefficients);
+        }
+        return scorer;
     }
-    let sizes = sizes(&scorer, &chosen);
-    for ((effect, candidate), coefficients) in effects.iter_mut().zip(chosen).zip(sizes) {
-        (effect.chosen.candidate, effect.chosen.coefficients) = (candidate, coefficients);
+}
+
+impl Search<'_, '_> {
+    /// The one of some effects that gains least beside the others, if that is less than is asked of an effect.
+    fn needless(&mut self, chosen: &[Candidate]) -> Option<usize> {
+        let without = |k: usize| chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, own)| own.clone()).collect::<Vec<_>>();
+        let gains: Vec<f64> = (0..chosen.len()).map(|k| self.better_by(chosen, &without(k))).collect();
+        (0..gains.len()).filter(|k| gains[*k] < self.thresholds.nats).min_by(|a, b| gains[*a].total_cmp(&gains[*b]))
     }
-    scorer
 }
 
 /// Makes columns anew until what is borne agrees with the sizes; which of them depend on it.

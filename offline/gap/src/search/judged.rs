@@ -3,7 +3,7 @@
 use super::explained::explained;
 use super::{Scored, Search, price};
 use crate::cell::Channel;
-use crate::hypothesis::{Candidate, RIPPLE, WALL, shaken};
+use crate::hypothesis::{Candidate, RIPPLE, WALL, part, rub_together, shaken};
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::Problem;
@@ -60,6 +60,8 @@ pub(super) struct Judged {
     pub(super) of_the_model: bool,
     /// Its RMS over the largest other effect's where it removes as much as is asked; infinite beside nothing.
     amplitude: f64,
+    /// Is it the other part of what rubs at its joint?
+    completes: bool,
 }
 
 /// Shares of the cells' squared errors, held out, that one fit leaves out and another has.
@@ -121,7 +123,8 @@ impl Search<'_, '_> {
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
         let resolved = |c: usize| own[c] > 0.0 && own[c] >= resolution(self.problem.cells[c].channel);
         let enough = enough && (0..own.len()).any(resolved);
-        Judged { gain, share, of_the_model, amplitude: if enough { amplitude } else { -1.0 } }
+        let completes = completes(&scored.candidate, others);
+        Judged { gain, share, of_the_model, amplitude: if enough { amplitude } else { -1.0 }, completes }
     }
 
     /// Gain of a candidate over the others with the noise that it leaves itself (Cochrane-Orcutt): by its autoregression, or
@@ -198,10 +201,21 @@ impl Search<'_, '_> {
 
     /// Of the largest effect's amplitude, what a further one has to have.
     fn least_amplitude(&self, judged: &Judged) -> f64 {
+        if judged.completes && judged.gain.least > SURE {
+            return 0.0;
+        }
         let everywhere = judged.gain.explained >= EVERYWHERE || (judged.share >= ALL && judged.gain.ranks >= IN_EACH);
         let surely = judged.share >= NEARLY_ALL && everywhere;
         if surely { LESS_THEN * self.thresholds.amplitude } else { self.thresholds.amplitude }
     }
+}
+
+/// Is it what goes with the speed where others have only what rubs dry at that joint and time, or the other way round? However small it is, it is no
+/// error of theirs: in 93 opened cases of one of the two alone, up to thirty times the noise, the other would remove a tenth of what is left at most, and
+/// mostly far more than a fourth where both are there (docs/decisions/0031).
+fn completes(own: &Candidate, others: &[Candidate]) -> bool {
+    let mut beside = others.iter().filter(|other| rub_together(own, other)).peekable();
+    beside.peek().is_some() && beside.all(|other| part(other) != part(own))
 }
 
 /// Does an effect show in more than a block or two: in their gains, their ranks, or the squared error that each explains?
