@@ -1,8 +1,7 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::hypothesis::{
-    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, part, rounds,
-    rub_together,
+    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, are_parts, rounds,
 };
 use crate::nominal::Nominal;
 use crate::parallel;
@@ -93,7 +92,7 @@ const OF_THE_OTHER_PART: f64 = 0.01;
 /// How much of a part of what rubs at a joint would fit the other part, alone.
 fn as_the_other_part(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
     let (own, _) = candidates[k];
-    let others = candidates.iter().filter(|(other, _)| rub_together(own, other) && part(other) != part(own));
+    let others = candidates.iter().filter(|(other, _)| are_parts(own, other));
     let product: f64 = others
         .flat_map(|(other, theta)| other.columns.iter().zip(*theta).map(|(column, theta)| theta * own.columns[0].dot(column)))
         .sum();

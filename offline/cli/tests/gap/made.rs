@@ -601,7 +601,7 @@ fn what_rubs_is_not_larger_for_a_weak_motor_that_is_asked_for_more() {
 
 #[test]
 fn an_arm_of_six_joints_is_an_arm_like_others() {
-    // Fifteen residuals, of each of which the best of thirty features explains a little by chance.
+    // Fifteen residuals and twice the library: what chance finds in so many is none.
     let folder = Folder::new("six");
     let order = |label: &str, effects| Order {
         seed: 95_000,
@@ -624,19 +624,25 @@ fn an_arm_of_six_joints_is_an_arm_like_others() {
 #[test]
 fn what_rubs_has_both_its_parts_however_small_one_of_them_is() {
     // The small one passed for the other's error, and the other was too large by 7 and 18 %, with intervals of 3 %.
-    for (label, large, small) in [
-        ("dry", ("coulomb_friction", "f_c", 0.7), ("viscous_friction", "b", 0.2)),
-        ("fast", ("viscous_friction", "b", 2.3), ("coulomb_friction", "f_c", 0.12)),
+    let (dry, slow) = (("coulomb_friction", "f_c", 0.7), ("viscous_friction", "b", 0.2));
+    for (label, large, small, interval) in [
+        ("dry", dry, slow, None),
+        ("fast", ("viscous_friction", "b", 2.3), ("coulomb_friction", "f_c", 0.12), None),
+        ("from then on", dry, ("viscous_friction", "b", 0.4), Some([5.0, 15.0])),
     ] {
         let folder = Folder::new(label);
-        let effects = [large, small].map(|(physics, name, value)| wanted(physics, Some(2), &[(name, value)]));
+        let of = |(physics, name, value)| Wanted { interval, ..wanted(physics, Some(2), &[(name, value)]) };
+        let effects = [large, small].map(of);
         let (case, _) = made(&folder, label, &effects, 15.0);
         let report = case.judged(&folder.file("out"));
         assert_eq!(primary(&report).len(), 2, "{}", report.summary);
         for (physics, name, value) in [large, small] {
             let told = primary(&report).into_iter().find(|v| v.physics.to_string() == physics).expect("named");
             assert_eq!(told.location.joint, ["elbow"]);
-            holds(told, name, value, 0.1);
+            match interval {
+                None => holds(told, name, value, 0.1),
+                Some(_) => near(told, name, value, 0.15),
+            }
         }
     }
 }

@@ -70,10 +70,23 @@ pub(crate) fn part(candidate: &Candidate) -> Option<Part> {
     }
 }
 
+/// Edges of what rubs that are one, s: an edge of a small part beside a large one is known no better.
+const ONE_EDGE_S: f64 = 0.6;
+
 /// Do both rub at the same joint, and at the same time?
 pub(crate) fn rub_together(one: &Candidate, other: &Candidate) -> bool {
     let both = part(one).is_some() && part(other).is_some();
-    both && one.family.joints == other.family.joints && one.windows == other.windows
+    let at_once = match (&one.windows, &other.windows) {
+        (None, None) => true,
+        (Some(own), Some(its)) => own.coincide(its, ONE_EDGE_S),
+        _ => false,
+    };
+    both && at_once && one.family.joints == other.family.joints
+}
+
+/// Are they the two parts of what rubs at a joint at one time?
+pub(crate) fn are_parts(one: &Candidate, other: &Candidate) -> bool {
+    rub_together(one, other) && part(one) != part(other)
 }
 
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {

@@ -15,7 +15,7 @@ mod unknown;
 mod windows;
 
 pub(crate) use actuation::{RIPPLE, shaken, torque_scale};
-pub(crate) use friction::{BY_LOAD, Part, part, rub_together};
+pub(crate) use friction::{BY_LOAD, Part, are_parts, part, rub_together};
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};

@@ -90,6 +90,12 @@ impl Windows {
             .any(|run| edges(self, run).iter().any(|own| edges(other, run).iter().any(|its| (own - its).abs() < within_s)))
     }
 
+    /// Do both begin and end in every run at the same time, to so many seconds?
+    pub fn coincide(&self, other: &Self, within_s: f64) -> bool {
+        let near = |own: f64, its: f64| own == its || (own - its).abs() < within_s;
+        (0..self.0.len().max(other.0.len())).all(|run| (0..2).all(|edge| near(self.of(run)[edge], other.of(run)[edge])))
+    }
+
     /// What it costs, nats.
     pub fn price(&self) -> f64 {
         let edges = |window: &Window| EDGES_NATS[window.iter().filter(|t| t.is_finite()).count()];
@@ -120,5 +126,14 @@ mod tests {
         let of = |windows: &[Window]| Windows::each(windows).expect("windows");
         assert!(late.share_edge(&of(&[[8.0, f64::INFINITY], [2.8, 5.0]]), 0.3));
         assert!(!of(&[[3.0, f64::INFINITY], [8.0, 9.0]]).share_edge(&of(&[[8.0, 9.0], [3.0, f64::INFINITY]]), 0.3));
+    }
+
+    #[test]
+    fn windows_coincide_if_both_their_edges_do_in_every_run() {
+        let (late, of) = (Windows::alike([3.0, f64::INFINITY]), |windows: &[Window]| Windows::each(windows).expect("windows"));
+        assert!(late.coincide(&Windows::alike([3.2, f64::INFINITY]), 0.3) && late.coincide(&late, 0.3));
+        for other in [Windows::alike([3.4, f64::INFINITY]), Windows::alike([3.0, 9.0]), of(&[[3.0, f64::INFINITY], NEVER])] {
+            assert!(!late.coincide(&other, 0.3) && !other.coincide(&late, 0.3), "{other:?}");
+        }
     }
 }

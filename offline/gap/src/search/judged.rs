@@ -3,7 +3,7 @@
 use super::explained::explained;
 use super::{Scored, Search, price};
 use crate::cell::Channel;
-use crate::hypothesis::{Candidate, RIPPLE, WALL, part, rub_together, shaken};
+use crate::hypothesis::{Candidate, RIPPLE, WALL, are_parts, rub_together, shaken};
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::Problem;
@@ -215,7 +215,7 @@ impl Search<'_, '_> {
 /// mostly far more than a fourth where both are there (docs/decisions/0031).
 fn completes(own: &Candidate, others: &[Candidate]) -> bool {
     let mut beside = others.iter().filter(|other| rub_together(own, other)).peekable();
-    beside.peek().is_some() && beside.all(|other| part(other) != part(own))
+    beside.peek().is_some() && beside.all(|other| are_parts(own, other))
 }
 
 /// Does an effect show in more than a block or two: in their gains, their ranks, or the squared error that each explains?

@@ -2,7 +2,7 @@
 
 use super::likeliest::{likeliest_first, simpler_is_enough};
 use super::{Scored, Search, price};
-use crate::hypothesis::{BY_LOAD, Candidate, Family, Part, RIPPLE, part, rounds, rub_together};
+use crate::hypothesis::{BY_LOAD, Candidate, Family, Part, RIPPLE, are_parts, part, rounds, rub_together};
 use crate::parallel;
 use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, within_bounds};
@@ -60,11 +60,12 @@ impl Search<'_, '_> {
         });
         sort(&mut claims);
         self.round_alike(grams, &base, &mut claims);
-        // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one.
+        // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one, but for the other part of what rubs.
         // And of one joint's dry friction there is one level, and what ripples in a drive shakes its cable.
         let robot = self.problem.robot;
-        let of =
-            |other: &Candidate, s: &Candidate| other.shares_edge(s) || levels_twice(other, s) || ripples_alike(other, s, robot);
+        let of = |other: &Candidate, s: &Candidate| {
+            (other.shares_edge(s) && !are_parts(other, s)) || levels_twice(other, s) || ripples_alike(other, s, robot)
+        };
         let rest = |s: &Scored| others.iter().any(|other| of(other, &s.candidate));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
