@@ -12,7 +12,7 @@ pub(crate) fn draw(random: &mut Random) -> Arm {
     draw_sized(size, random)
 }
 
-/// An arm of so many joints, four or six at most, as a laboratory describes it.
+/// An arm of two, three, four or six joints as a laboratory describes it.
 pub(crate) fn draw_sized(size: usize, random: &mut Random) -> Arm {
     let sliding = if random.chance(0.5) { Some(random.index(size)) } else { None };
     let (mut joints, mut links) = (Vec::new(), Vec::new());

@@ -572,34 +572,6 @@ fn a_payload_is_named_and_weighed_the_same_each_time() {
 }
 
 #[test]
-fn a_soft_cable_bears_the_weight_that_was_found_too() {
-    // By the weight of the links alone the cable of an insertion gave way twice as far.
-    let soft = wanted("cable_stretch", Some(3), &[("k", 9000.0)]);
-    for (label, window) in [("borne", None), ("borne for a while", Some([5.0, 13.0]))] {
-        let folder = Folder::new(label);
-        let weight = Wanted { interval: window, ..wanted("payload", None, &[("m_p", 0.4)]) };
-        let (case, truth) = made(&folder, label, &[weight, soft.clone()], 14.0);
-        let report = case.judged(&folder.file("out"));
-        let of = |physics: &str| primary(&report).into_iter().find(|v| v.physics.to_string() == physics).expect("named");
-        holds(of("cable_stretch"), "k", truth[1].effect.parameters["k"], 0.1);
-        near(of("payload"), "m_p", 0.4, 0.1);
-    }
-}
-
-#[test]
-fn what_rubs_is_not_larger_for_a_weak_motor_that_is_asked_for_more() {
-    // It was larger by 1/0.7, with an interval of 4 %.
-    let folder = Folder::new("weak");
-    let effects = [wanted("motor_torque_scale", Some(2), &[("kappa", 0.7)]), wanted("viscous_friction", Some(2), &[("b", 1.4)])];
-    let (case, truth) = made(&folder, "weak", &effects, 14.0);
-    let report = case.judged(&folder.file("out"));
-    let of = |physics: &str| primary(&report).into_iter().find(|v| v.physics.to_string() == physics).expect("named");
-    holds(of("motor_torque_scale"), "kappa", 0.7, 0.03);
-    holds(of("viscous_friction"), "b", truth[1].effect.parameters["b"], 0.05);
-    assert_eq!(primary(&report).len(), 2, "{}", report.summary);
-}
-
-#[test]
 fn an_arm_of_six_joints_is_an_arm_like_others() {
     // Fifteen residuals and twice the library: what chance finds in so many is none.
     let folder = Folder::new("six");

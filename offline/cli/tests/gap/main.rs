@@ -3,6 +3,7 @@
 
 mod altered;
 mod as_logged;
+mod borne;
 mod by_run;
 mod common;
 mod document;

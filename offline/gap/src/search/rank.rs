@@ -227,8 +227,8 @@ const BORNE_OUT: f64 = 0.5;
 /// Cosine between two effects from which on they are one: what a load does that varies by a seventh at most is a level.
 const ONE: f64 = 0.99;
 
-/// Do both have a level of dry friction at the same joint, all the time? Only their sum is seen. A load that hardly changes makes one as well: a joint
-/// that slides upright had three and twenty newtons by its weight, and twenty less than none without.
+/// Do both have a level of dry friction at the same joint and time? Only their sum is seen. A load that hardly changes makes one as well: a joint that
+/// slides upright was told 287 N of dry friction, and nearly as much less by its weight.
 fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
     if !rub_together(one, other) || [one, other].iter().any(|own| part(own) != Some(Part::Dry)) {
         return false;
