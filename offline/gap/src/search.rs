@@ -273,6 +273,11 @@ fn to_judge(ranked: &[Scored]) -> Vec<&Scored> {
     first.chain(by_gain.into_iter().take(JUDGED).filter(|k| *k >= JUDGED)).map(|k| &ranked[k]).collect()
 }
 
+/// All of some candidates but one.
+fn all_but(chosen: &[Candidate], without: usize) -> Vec<Candidate> {
+    chosen.iter().enumerate().filter(|(k, _)| *k != without).map(|(_, candidate)| candidate.clone()).collect()
+}
+
 /// What a candidate pays for being one of many or less likely, nats.
 fn price(candidate: &Candidate) -> f64 {
     let late = candidate.windows.is_some() && candidate.family.physics == "measurement_delay";

@@ -48,12 +48,17 @@ impl Column {
         self
     }
 
-    /// Sum of the products with another one, row by row.
+    /// Sums of the products with another one, row by row, of each cell that both have.
+    pub(crate) fn products(&self, other: &Self) -> impl Iterator<Item = (usize, f64)> {
+        self.parts.iter().filter_map(|(cell, own)| {
+            let (_, its) = other.parts.iter().find(|(other, _)| other == cell)?;
+            Some((*cell, own.iter().zip(its).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()))
+        })
+    }
+
+    /// Sum of all of them.
     pub(crate) fn dot(&self, other: &Self) -> f64 {
-        let both = self.parts.iter().filter_map(|(cell, own)| {
-            other.parts.binary_search_by_key(cell, |(cell, _)| *cell).ok().map(|at| (own, &other.parts[at].1))
-        });
-        both.map(|(a, b)| a.iter().zip(b).map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()).sum()
+        self.products(other).map(|(_, product)| product).sum()
     }
 
     /// Makes it 0 where a cell says nothing.

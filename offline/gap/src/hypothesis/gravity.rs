@@ -149,12 +149,7 @@ impl Weights {
     }
 
     fn dot(&self, x: &Column, y: &Column) -> f64 {
-        let of_cell = |(cell, values): &(usize, Vec<f32>)| {
-            let (_, other) = y.parts.iter().find(|(other, _)| other == cell)?;
-            let sum: f64 = values.iter().zip(other).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-            Some(sum * self.0[*cell])
-        };
-        x.parts.iter().filter_map(of_cell).sum()
+        x.products(y).map(|(cell, product)| product * self.0[cell]).sum()
     }
 
     /// What of a column is not along another one.

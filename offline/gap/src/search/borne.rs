@@ -1,7 +1,7 @@
 //! What was found is borne as the links are: a weight stretches a soft cable, and loads what rubs by its load; and a motor that gives too little has to
 //! give for all of it. Effects are first sized by what is believed alone, and anew by all once it is known.
 
-use super::{Effect, Search, Thresholds};
+use super::{Effect, Search, Thresholds, all_but};
 use crate::hypothesis::{Candidate, Dictionary, besides, torque_scale};
 use crate::score::Scorer;
 
@@ -55,8 +55,7 @@ pub(super) fn bear<'p>(
 impl Search<'_, '_> {
     /// The one of some effects that gains least beside the others, if that is less than is asked of an effect.
     fn needless(&mut self, chosen: &[Candidate]) -> Option<usize> {
-        let without = |k: usize| chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, own)| own.clone()).collect::<Vec<_>>();
-        let gains: Vec<f64> = (0..chosen.len()).map(|k| self.better_by(chosen, &without(k))).collect();
+        let gains: Vec<f64> = (0..chosen.len()).map(|k| self.better_by(chosen, &all_but(chosen, k))).collect();
         (0..gains.len()).filter(|k| gains[*k] < self.thresholds.nats).min_by(|a, b| gains[*a].total_cmp(&gains[*b]))
     }
 }

@@ -1,7 +1,7 @@
 //! What was chosen, held against everything else in its place: swapped, or dropped.
 
 use super::judged::Judged;
-use super::{Effect, Scored, Search, describe, price};
+use super::{Effect, Scored, Search, all_but, describe, price};
 use crate::hypothesis::Candidate;
 
 /// What may stand in an effect's place beside the others: all, the first of it, and what of it is acceptable.
@@ -22,8 +22,7 @@ impl Search<'_, '_> {
             effects.clear();
             // The last ones first: they explain what the first ones may explain as well, once refined alone.
             for k in (0..chosen.len()).rev() {
-                let as_they_are: Vec<Candidate> =
-                    chosen.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, c)| c.clone()).collect();
+                let as_they_are = all_but(chosen, k);
                 let mut others = as_they_are.clone();
                 if let [only] = others.as_mut_slice() {
                     *only = self.refined(&self.scorer.empty(), only);
