@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::time::Instant;
 
 use gap_report::{
-    Channel as Told, DataQuality, Fit, FloorMethod, Level, Physics, Report, Role, Run as ToldRun, RunRole, Space, Status,
+    Channel as Told, DataQuality, Fit, FloorMethod, Level, Physics, Report, Role, Run as ToldRun, RunRole, Space, Status, Verdict,
 };
 use recordings::Recording;
 use simulator::model::RobotModel;
@@ -190,8 +190,8 @@ fn analyse_runs(
     let simulated = parallel::map(given, |one| if one.sim.is_some() { None } else { builtin::simulated(model, &one.real) });
     let taken = Taken { at_its_word: true, shaken: false };
     let mut at_its_word = analyse_with(model, given, options, (&simulated, taken), progress)?;
-    if ripples(&at_its_word.report) {
-        progress("the links, shaken by the ripple");
+    if may_shake(&at_its_word.report) {
+        progress("the links, shaken on their cables");
         let shaken = analyse_with(model, given, options, (&simulated, Taken { shaken: true, ..taken }), progress)?;
         // What the encoders of the joints tell of it may be no more than their noise.
         if shaken.left < at_its_word.left && unexplained(&shaken) <= unexplained(&at_its_word) {
@@ -231,10 +231,16 @@ fn unexplained(outcome: &Outcome) -> u8 {
     }
 }
 
-/// Does a motor ripple? That shakes the links on their cables: their own encoders show how they accelerate then, the motors' do not.
-fn ripples(report: &Report) -> bool {
-    report.inputs.channels.contains(&Told::Transmission)
-        && report.verdicts.iter().any(|verdict| verdict.role == Role::Primary && verdict.physics == Physics::TorqueRipple)
+/// Does a motor ripple, or a cable give way while its signals seem late? Links shake on their cables then: their own encoders show how they
+/// accelerate, the motors' do not.
+fn may_shake(report: &Report) -> bool {
+    let is_told = |physics: &[Physics]| {
+        let primary = |verdict: &&Verdict| verdict.role == Role::Primary;
+        report.verdicts.iter().filter(primary).any(|verdict| physics.contains(&verdict.physics))
+    };
+    let late =
+        is_told(&[Physics::CableStretch, Physics::CableHysteresis, Physics::Backlash]) && is_told(&[Physics::MeasurementDelay]);
+    report.inputs.channels.contains(&Told::Transmission) && (late || is_told(&[Physics::TorqueRipple]))
 }
 
 /// Does hardly anything but noise remain?

@@ -1,11 +1,14 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
+use crate::cell::Channel;
 use crate::hypothesis::{
-    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, ROTOR, START, STRIBECK_RANGE, are_parts, rounds,
+    AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, OUT_OF_PLANE, ROTOR, START, STRIBECK_RANGE, are_parts,
+    levels_what_fades, rounds,
 };
 use crate::nominal::Nominal;
 use crate::parallel;
 use crate::parameters::{Named, parameters};
+use crate::problem::Problem;
 use crate::refine;
 use crate::robot::Robot;
 use crate::score::{Grams, Scorer};
@@ -97,6 +100,51 @@ fn as_the_other_part(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
         .flat_map(|(other, theta)| other.columns.iter().zip(*theta).map(|(column, theta)| theta * own.columns[0].dot(column)))
         .sum();
     product / own.columns[0].dot(&own.columns[0]).max(1e-300)
+}
+
+/// How long before a recording friction began to fade is supposed, beside a level that is free, to so much, s.
+const BEGAN_S: f64 = 0.5;
+
+/// How much of a level friction beside it has faded by, or has not, in the time by which that began otherwise than supposed.
+fn as_faded(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
+    let (own, _) = candidates[k];
+    let fading = candidates.iter().filter(|(other, _)| levels_what_fades(own, other));
+    fading.map(|(other, theta)| theta[0] * BEGAN_S / other.shape_of("T").unwrap_or(f64::INFINITY)).sum()
+}
+
+/// Of the load of a cable, as much as it is not known by, whatever it looks like.
+pub(crate) const OF_THE_LOAD: f64 = 0.12;
+
+/// How much a spring's parameter, or that of a zero that is off beside it, may be wrong by since its load is: the zero takes what does not change of the
+/// spring's effect, and leaves it as much less to be known by.
+fn as_loaded(problem: &Problem, candidates: &[(&Candidate, &[f64])], k: usize, value: f64) -> f64 {
+    let (own, _) = candidates[k];
+    let of = |physics: &str| {
+        let there = |(other, _): &&(&Candidate, &[f64])| {
+            other.family.physics == physics && other.family.joints == own.family.joints && other.windows.is_none()
+        };
+        candidates.iter().find(there)
+    };
+    let Some(((spring, theta), (zero, _))) = of("cable_stretch").zip(of("joint_offset")) else { return 0.0 };
+    let is_there = |cell: &&usize| problem.cells[**cell].channel == Channel::Transmission;
+    let Some(cell) = zero.columns[0].parts.iter().map(|(cell, _)| cell).find(is_there) else { return 0.0 };
+    let effect = spring.effect(*cell, theta);
+    let mean = crate::series::mean(&effect);
+    let (whole, varies) = (rms(effect.iter().copied()), rms(effect.iter().map(|x| x - mean)));
+    match own.family.physics {
+        "cable_stretch" => OF_THE_LOAD * value.abs() * whole / varies.max(1e-300),
+        "joint_offset" => OF_THE_LOAD * whole,
+        _ => 0.0,
+    }
+}
+
+/// All dry friction of a drive that fades, if some of it was found: what the simulation has as well.
+fn all_that_fades(candidates: &[(&Candidate, &[f64])], k: usize, nominal: &Nominal) -> Option<f64> {
+    let (fading, _) = candidates[k];
+    let mut found = candidates.iter().filter(|(level, _)| levels_what_fades(level, fading)).peekable();
+    let _ = found.peek()?;
+    let own = nominal.drives[*fading.family.joints.first()?][2];
+    Some(own + found.map(|(level, theta)| level.level_of(theta)).sum::<f64>()).filter(|all| *all > 0.0)
 }
 
 /// The numbers that say how large an effect is, with what they are where there is none. Not of forms with other coefficients (a place, a
@@ -312,7 +360,8 @@ fn of_candidates(
         .zip(layout)
         .enumerate()
         .map(|(own, (candidate, (column, theta, which)))| {
-            let of_the_other = as_the_other_part(&sized, own);
+            let all_that_fades = all_that_fades(&sized, own, nominal);
+            let of_others = (OF_THE_OTHER_PART * as_the_other_part(&sized, own)).hypot(as_faded(&sized, own));
             let of = |coefficients: &[f64]| -> Vec<Named> {
                 let own = &coefficients[column..column + theta.len()];
                 let mut shape = candidate.shape.clone();
@@ -326,7 +375,12 @@ fn of_candidates(
                 }
                 // Deviations are taken from the wide fit, values from the plain one.
                 let at: Vec<f64> = own.iter().zip(&wide.coefficients[column..]).zip(&theta).map(|((x, w), t)| t + x - w).collect();
-                parameters(robot, nominal, candidate, &at, &shape)
+                let mut all = parameters(robot, nominal, candidate, &at, &shape);
+                if let Some(friction) = all_that_fades {
+                    all.retain(|one| one.name != "kappa_T");
+                    all.insert(0, Named { name: "kappa_T", unit: "1", value: -at[0] / friction });
+                }
+                all
             };
             let values = of(&wide.coefficients);
             let replicates: Vec<Vec<Named>> = wide.without.iter().map(|c| of(c)).collect();
@@ -343,13 +397,17 @@ fn of_candidates(
                     let shared = common(physics, form, named.name) * size(physics, named, &values);
                     let reach = reach(beside(physics, named, &values).count());
                     let plain = matches!((physics, named.name), ("coulomb_friction", "f_c") | ("viscous_friction", "b"));
-                    let beside = if plain { OF_THE_OTHER_PART * of_the_other } else { 0.0 };
-                    let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name)).hypot(beside);
+                    let of_others = match named.name {
+                        "k" | "o" => as_loaded(dictionary.problem, &sized, own, named.value),
+                        _ if plain => of_others,
+                        _ => 0.0,
+                    };
+                    let half = (reach * spread(k)).hypot(shared).hypot(supposed(physics, form, named.name)).hypot(of_others);
                     let [least, most] = possible(physics, form, named);
-                    (
-                        named.clone(),
-                        [(named.value - half).max(least.min(named.value)), (named.value + half).min(most.max(named.value))],
-                    )
+                    let either = form == OUT_OF_PLANE && !candidate.family.shape.contains(&named.name);
+                    let high = (named.value + half).min(most.max(named.value));
+                    let low = if either { -high } else { (named.value - half).max(least.min(named.value)) };
+                    (named.clone(), [low, high])
                 })
                 .collect();
             Estimate { parameters, windows: Vec::new(), coefficients: theta }

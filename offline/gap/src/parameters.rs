@@ -1,6 +1,8 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
-use crate::hypothesis::{Candidate, DRIFTS, GROUND, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, torque_scale};
+use crate::hypothesis::{
+    Candidate, DRIFTS, GROUND, HEATING_S, OUT_OF_PLANE, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, torque_scale,
+};
 use crate::nominal::Nominal;
 use crate::robot::Robot;
 use std::f64::consts::TAU;
@@ -60,7 +62,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
         ("thermal_drift", _) => {
             let friction = nominal.drives[joint][2];
             let share = (friction > 0.0).then(|| named("kappa_T", "1", -theta[0] / friction));
-            share.into_iter().chain([named("T", "s", shaped("T"))]).collect()
+            share.into_iter().chain([named("T", "s", shaped("T").max(HEATING_S[0]))]).collect()
         }
         ("payload", "anywhere on the last link") => {
             let mut all = vec![named("m_p", "kg", theta[0])];
@@ -73,6 +75,12 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             let mut all = vec![named("m_p", "kg", theta[0])];
             all.extend(["c_x", "c_y", "c_z"].map(|name| named(name, "m", shaped(name))));
             all
+        }
+        // By which side gravity leaves the plane of the joints nothing tells, only by how much.
+        ("gravity_direction", OUT_OF_PLANE) => {
+            let (across, along) = (theta[0], 1.0 - theta[1]);
+            let (turned, out) = (across.atan2(along), across.hypot(along).min(1.0).acos());
+            ["a", "b"].map(|name| named(name, "rad", if place(name).is_some() { turned } else { out })).into()
         }
         // What the motion does not show of it is not told.
         ("gravity_direction", _) => ["a", "b"].iter().filter_map(|name| Some(named(name, "rad", theta[place(name)?]))).collect(),

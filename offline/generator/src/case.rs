@@ -40,6 +40,8 @@ impl Order {
             Kind::Raven => robots::raven(&mut random),
             Kind::Variant => robots::variant(&mut random),
             Kind::Six => robots::six(&mut random),
+            Kind::Planar => robots::planar(&mut random),
+            Kind::Gantry => robots::gantry(&mut random),
         }
     }
 

@@ -44,6 +44,10 @@ pub enum Kind {
     Variant,
     /// One of six joints, drawn at random.
     Six,
+    /// Two links that turn about parallel level axes, drawn at random.
+    Planar,
+    /// Three slides at right angles, the last upright, drawn at random.
+    Gantry,
 }
 
 /// A case that is asked for.

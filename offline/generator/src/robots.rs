@@ -105,3 +105,15 @@ pub fn six(random: &mut Random) -> Pair {
     let model = crate::variants::draw_sized(6, random);
     Pair { truth: deviate(&model, random), model }
 }
+
+/// Two links that turn about parallel level axes.
+pub fn planar(random: &mut Random) -> Pair {
+    let model = crate::variants::draw_planar(random);
+    Pair { truth: deviate(&model, random), model }
+}
+
+/// Three slides at right angles.
+pub fn gantry(random: &mut Random) -> Pair {
+    let model = crate::variants::draw_gantry(random);
+    Pair { truth: deviate(&model, random), model }
+}

@@ -1,4 +1,4 @@
-//! Arms other than RAVEN: two to four joints or six, some sliding, any mount, masses and ratios.
+//! Arms other than RAVEN: two to four joints or six, some sliding, any mount, masses and ratios; and plain ones, planar and gantries.
 
 use crate::arm::{Arm, Drive, DryLaw, Joint, Link, Motion};
 use crate::lagrange::Chain;
@@ -33,6 +33,52 @@ pub(crate) fn draw_sized(size: usize, random: &mut Random) -> Arm {
         joints,
         links,
         tip: [round(length), 0.0, 0.0],
+        drives: Vec::new(),
+        dry_law: DryLaw::Smooth(0.5),
+    };
+    arm.drives = drives(&arm, random);
+    arm
+}
+
+/// Two links that turn in one upright plane.
+pub(crate) fn draw_planar(random: &mut Random) -> Arm {
+    let mut length = 0.0;
+    let mut mass = random.uniform(1.0, 2.5);
+    let (mut joints, mut links) = (Vec::new(), Vec::new());
+    for j in 0..2 {
+        joints.push(Joint { rpy: [if j == 0 { FRAC_PI_2 } else { 0.0 }, 0.0, 0.0], ..joint(j, Motion::Turns, length, random) });
+        length = random.uniform(0.2, 0.4);
+        links.push(link(j, round(mass), length, random));
+        mass *= random.uniform(0.4, 0.8);
+    }
+    let mut arm = Arm {
+        name: "planar-2dof".into(),
+        mount: [0.0; 3],
+        joints,
+        links,
+        tip: [round(length), 0.0, 0.0],
+        drives: Vec::new(),
+        dry_law: DryLaw::Smooth(0.5),
+    };
+    arm.drives = drives(&arm, random);
+    arm
+}
+
+/// Slides along x and y, and one upwards, each of which carries the next.
+pub(crate) fn draw_gantry(random: &mut Random) -> Arm {
+    let mut mass = random.uniform(2.0, 4.0);
+    let (mut joints, mut links) = (Vec::new(), Vec::new());
+    for (j, axis) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
+        joints.push(Joint { rpy: [0.0; 3], axis, ..joint(j, Motion::Slides, 0.0, random) });
+        links.push(link(j, round(mass), 0.1, random));
+        mass *= random.uniform(0.4, 0.7);
+    }
+    let mut arm = Arm {
+        name: "gantry-3dof".into(),
+        mount: [0.0; 3],
+        joints,
+        links,
+        tip: [0.0, 0.0, -0.1],
         drives: Vec::new(),
         dry_law: DryLaw::Smooth(0.5),
     };

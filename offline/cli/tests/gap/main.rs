@@ -9,6 +9,7 @@ mod common;
 mod document;
 mod examples;
 mod gaps;
+mod joined;
 mod live;
 mod made;
 #[path = "../common/mod.rs"]

@@ -32,7 +32,7 @@ const LESS_SLIDING: f64 = 0.1;
 /// First guess of the time in which a bristle settles, s.
 const SETTLING_S: [f64; 1] = [0.004];
 /// Time constants of heating, s.
-pub(super) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+pub(crate) const HEATING_S: [f64; 6] = [3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 /// What warms up or creeps began so long before the recording, to begin with, s: a moment, since drives move before one records, or some
 /// seconds. Taken for none it bends what follows, and time constants of a recording's length come out half as long.
 pub(super) const BEFORE_S: [f64; 2] = [0.5, 4.0];
@@ -44,7 +44,7 @@ pub(super) const BEFORE: &str = "before";
 
 /// Its name in the vocabulary.
 pub(crate) const BY_LOAD: &str = "load_dependent_friction";
-const STRIBECK: &str = "stribeck_friction";
+pub(crate) const STRIBECK: &str = "stribeck_friction";
 /// Forms of friction before a cable, and behind it: for any load, that of the links alone, and their weight.
 pub(crate) const AT_MOTOR: [&str; 3] = ["motor side", "motor side, by its links", "motor side, by their weight"];
 const AT_LINK: [&str; 3] = ["link side", "link side, by its links", "link side, by their weight"];
@@ -82,6 +82,37 @@ pub(crate) fn rub_together(one: &Candidate, other: &Candidate) -> bool {
         _ => false,
     };
     both && at_once && one.family.joints == other.family.joints
+}
+
+/// Friction that fades: the simulation's, or that which was found besides as well. How long it has been fading and how much there was then make up for one
+/// another in the latter.
+const FADES: &str = "friction fades";
+const FOUND_FADES: &str = "friction fades, what was found as well";
+
+/// Is dry friction, all the time, beside friction of its joint that fades?
+pub(crate) fn levels_what_fades(level: &Candidate, fading: &Candidate) -> bool {
+    let has_level = level.family.physics != BY_LOAD || level.is_by_load_and_level();
+    [FADES, FOUND_FADES].contains(&fading.family.form)
+        && part(level) == Some(Part::Dry)
+        && has_level
+        && level.windows.is_none()
+        && level.family.joints == fading.family.joints
+}
+
+/// Is a candidate the form of friction that fades which can be beside these?
+pub(crate) fn may_fade(candidate: &Candidate, beside: &[Candidate]) -> bool {
+    match candidate.family.form {
+        FADES => !beside.iter().any(|level| levels_what_fades(level, candidate)),
+        FOUND_FADES => beside.iter().any(|level| levels_what_fades(level, candidate)),
+        _ => true,
+    }
+}
+
+/// Does friction fade, or grow, by no more than there is of it: in the simulation, and found besides, with these coefficients?
+pub(crate) fn fades_within(fading: (&Candidate, &[f64]), of_simulation: f64, beside: &[(&Candidate, &[f64])]) -> bool {
+    let (own, theta) = fading;
+    let found = beside.iter().filter(|(level, _)| levels_what_fades(level, own)).map(|(level, theta)| level.level_of(theta));
+    own.family.form != FOUND_FADES || of_simulation <= 0.0 || theta[0].abs() <= of_simulation + found.sum::<f64>()
 }
 
 /// Are they the two parts of what rubs at a joint at one time?
@@ -137,8 +168,7 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
     let slowest = SIGN_SPEED.map(|share| share * speed);
     let speeds = (&[("v_eps", true)][..], product(&[&slowest]), Turn::BySpeed);
     let bristles = (&[("presliding", true), ("settling", true)][..], product(&[&travels, &SETTLING_S]), Turn::ByTravel);
-    let heated = product(&[&HEATING_S, &BEFORE_S]);
-    // No more can fade than there is.
+    // No more can fade than there is; of what was found that is asked once it is (`fades_within`).
     let coulomb = dictionary.problem.nominal.drives[j][2];
     let fades = if coulomb > 0.0 { Bound::Between(-coulomb, coulomb) } else { Bound::Free };
     // Nor can the robot have less friction than none: of what the simulation has at this place, all may be too much.
@@ -159,15 +189,17 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive, positive], names, starts.clone(), with_level);
             all.push(family.penalised(3.0 + more));
         }
-        if !at_link {
+        let fading = [(FADES, fades, &BEFORE_S[..]), (FOUND_FADES, Bound::Free, &BEFORE_S[..1])];
+        for (form, bound, before) in fading.into_iter().filter(|_| !at_link) {
+            let heated = product(&[&HEATING_S, before]);
             all.push(
                 Family::shaped(
                     "thermal_drift",
                     &[j],
-                    "friction fades",
+                    form,
                     TORQUE,
-                    &[fades],
-                    &[&[("T", true), (BEFORE, true)], names].concat(),
+                    &[bound],
+                    &[&[("T", true), (BEFORE, before.len() > 1)], names].concat(),
                     heated.iter().flat_map(|heat| starts.iter().map(move |s| [heat, &s[..]].concat())).collect(),
                     move |d, s| vec![d.effort_of(j, times(&heat(d, j, &s[..2]), &smooth(d, place, &s[2..], turn)), false)],
                 )

@@ -11,11 +11,18 @@ use crate::series::noise_of;
 
 const TORQUE: Channel = Channel::JointTorque;
 /// Furthest turn about an axis, rad.
-const FURTHEST: Bound = Bound::Between(-0.9, 0.9);
+const MOST: f64 = 0.9;
+const FURTHEST: Bound = Bound::Between(-MOST, MOST);
 /// Angles less than this are that large: a secant of nothing is a tangent.
 const LEAST: f64 = 1e-4;
+/// Share of the weights per radian that is none: what no joint feels in the first order has no direction.
+const NOT_SEEN: f64 = 1e-3;
 /// The form with links that are not what the lab says.
 pub(crate) const WITH_OTHER_LINKS: &str = "turned, with other links";
+/// The form of a turn in the plane in which all joints turn.
+pub(crate) const IN_THE_PLANE: &str = "turned about one axis";
+/// The form of a turn out of the plane in which all joints turn besides: by that they bear less of every weight.
+pub(crate) const OUT_OF_PLANE: &str = "turned, and out of the plane of the joints";
 /// What a lab may be wrong by: a link's mass, as a share of it, and its centre, m.
 const MASS: f64 = 0.6;
 const CENTRE_M: f64 = 0.06;
@@ -28,17 +35,39 @@ type Number = (usize, usize);
 /// Turned, and turned with links that are not what the lab says: gravity from another side loads joints by numbers that before it did not, and
 /// which no motion of the simulation tells.
 pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
-    all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[FURTHEST; 2], &["a", "b"], |d, s| turned(d, s).into()));
     let weights = Weights::new(dictionary);
     let tangents = turned(dictionary, &[0.0; 2]);
+    let weight = dictionary.difference(dictionary.believed(), &dictionary.loads_of(&weightless(dictionary)), 1.0, true);
+    let size = |column: &Column| weights.dot(column, column).sqrt();
+    if tangents.iter().all(|tangent| size(tangent) <= NOT_SEEN * size(&weight)) {
+        return;
+    }
+    all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[FURTHEST; 2], &["a", "b"], |d, s| turned(d, s).into()));
     if let Some(axis) = only_axis(&tangents, &weights) {
         let name = ["a", "b"][axis];
         let about = move |x: f64| if axis == 0 { [x, 0.0] } else { [0.0, x] };
-        all.push(Family::secant("gravity_direction", &[], "turned about one axis", TORQUE, &[FURTHEST], &[name], move |d, s| {
+        all.push(Family::secant("gravity_direction", &[], IN_THE_PLANE, TORQUE, &[FURTHEST], &[name], move |d, s| {
             let angle = no_less(s[0]);
             let [a, b] = about(angle);
             vec![d.difference(&d.loads_of(&tilted(d, a, b)), d.believed(), angle, true)]
         }));
+        // Weights along the plane and across it are linear in gravity's two parts there.
+        let bounds = [FURTHEST, Bound::Between(0.0, 1.0 - MOST.cos())];
+        let family = Family::shaped(
+            "gravity_direction",
+            &[],
+            OUT_OF_PLANE,
+            TORQUE,
+            &bounds,
+            &[(name, false)],
+            vec![vec![0.0]],
+            move |d, _| {
+                let [a, b] = about(LEAST);
+                let (turned, none) = (d.loads_of(&tilted(d, a, b)), d.loads_of(&weightless(d)));
+                vec![d.difference(&turned, d.believed(), LEAST, true), d.difference(&none, d.believed(), 1.0, true)]
+            },
+        );
+        all.push(family.penalised(1.0));
     }
     let Some(about) = weights.angles(dictionary, &tangents) else { return };
     let numbers = told_apart(dictionary, &weights, &about);
@@ -78,6 +107,13 @@ fn no_less(angle: f64) -> f64 {
 fn tilted(d: &Dictionary, a: f64, b: f64) -> SerialArm {
     let mut arm = d.problem.robot.arm.clone();
     arm.set_gravity(Rotation3::from_scaled_axis(Vector3::new(a, b, 0.0)) * arm.gravity_vector());
+    arm
+}
+
+/// The arm where nothing weighs anything.
+fn weightless(d: &Dictionary) -> SerialArm {
+    let mut arm = d.problem.robot.arm.clone();
+    arm.set_gravity(Vector3::zeros());
     arm
 }
 

@@ -15,12 +15,14 @@ mod unknown;
 mod windows;
 
 pub(crate) use actuation::{RIPPLE, shaken, torque_scale};
-pub(crate) use friction::{BY_LOAD, Part, are_parts, part, rub_together};
+pub(crate) use friction::{
+    BY_LOAD, HEATING_S, Part, STRIBECK, are_parts, fades_within, levels_what_fades, may_fade, part, rub_together,
+};
 pub(crate) use hysteresis::{OWN_STIFFNESS, START};
 pub(crate) use timing::LATE_TORQUES;
 pub(crate) use transmission::{DRIFTS, GROUND, LATE_COUPLING, SENSOR};
 pub use unknown::UNMODELLED;
-pub(crate) use unknown::{HARDENING, STEPS_IN_TIME};
+pub(crate) use unknown::{HARDENING, SQUARED, STEPS_IN_TIME};
 
 use std::sync::Arc;
 
@@ -29,7 +31,7 @@ pub use dictionary::{Column, Dictionary};
 pub(crate) use environment::WALL;
 pub use environment::direction;
 pub(crate) use friction::{AT_MOTOR, STRIBECK_RANGE};
-pub(crate) use gravity::WITH_OTHER_LINKS;
+pub(crate) use gravity::{IN_THE_PLANE, OUT_OF_PLANE, WITH_OTHER_LINKS};
 pub(crate) use inertial::{AT_THE_TIP, CARRIED, ROTOR};
 pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
 pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
@@ -468,6 +470,11 @@ impl Candidate {
     /// Is it friction by load with a level of dry friction beside?
     pub fn is_by_load_and_level(&self) -> bool {
         self.family.physics == BY_LOAD && self.columns.len() > 1
+    }
+
+    /// Of dry friction with these coefficients, the level that no load is needed for.
+    pub(crate) fn level_of(&self, coefficients: &[f64]) -> f64 {
+        coefficients.get(usize::from(self.is_by_load_and_level())).copied().unwrap_or(0.0)
     }
 
     /// Are the two of the same form and shape?

@@ -34,6 +34,9 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     }
 }
 
+/// What grows with the square of the speed.
+pub(crate) const SQUARED: &str = "velocity squared";
+
 fn push_friction(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
     const TORQUE: Channel = Channel::JointTorque;
     for at_link in [false, true] {
@@ -45,7 +48,7 @@ fn push_friction(dictionary: &Dictionary, j: usize, all: &mut Vec<Family>) {
             vec![d.effort_of(j, squared, at_link)]
         };
         let penalty = if at_link { 7.0 } else { 6.0 };
-        all.push(Family::fixed(UNMODELLED, &[j], "velocity squared", TORQUE, &[Bound::Free], drag).penalised(penalty));
+        all.push(Family::fixed(UNMODELLED, &[j], SQUARED, TORQUE, &[Bound::Free], drag).penalised(penalty));
     }
     let waves = move |d: &Dictionary, s: &[f64]| {
         let sign = super::friction::steep(d, j);

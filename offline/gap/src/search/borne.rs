@@ -38,7 +38,7 @@ pub(super) fn bear<'p>(
             scorer = search.scorer;
         }
         let mut search = Search { problem: dictionary.problem, dictionary, scorer, candidates: Vec::new(), thresholds };
-        let needless = if bears { search.needless(&chosen) } else { None };
+        let needless = search.needless(&chosen, if bears { thresholds.nats } else { 0.0 });
         scorer = search.scorer;
         if let Some(needless) = needless {
             effects.remove(needless);
@@ -53,10 +53,11 @@ pub(super) fn bear<'p>(
 }
 
 impl Search<'_, '_> {
-    /// The one of some effects that gains least beside the others, if that is less than is asked of an effect.
-    fn needless(&mut self, chosen: &[Candidate]) -> Option<usize> {
+    /// The one of some effects that gains least beside the others, if that is less than so much, nats: once loads are known than is asked of an effect,
+    /// else than what it pays, since the others were settled after it.
+    fn needless(&mut self, chosen: &[Candidate], nats: f64) -> Option<usize> {
         let gains: Vec<f64> = (0..chosen.len()).map(|k| self.better_by(chosen, &all_but(chosen, k))).collect();
-        (0..gains.len()).filter(|k| gains[*k] < self.thresholds.nats).min_by(|a, b| gains[*a].total_cmp(&gains[*b]))
+        (0..gains.len()).filter(|k| gains[*k] < nats).min_by(|a, b| gains[*a].total_cmp(&gains[*b]))
     }
 }
 

@@ -3,7 +3,8 @@
 use super::explained::explained;
 use super::{Scored, Search, price};
 use crate::cell::Channel;
-use crate::hypothesis::{Candidate, RIPPLE, WALL, are_parts, rub_together, shaken};
+use crate::hypothesis::{Candidate, RIPPLE, WALL, are_parts, fades_within, rub_together, shaken};
+use crate::intervals::OF_THE_LOAD;
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::Problem;
@@ -35,6 +36,9 @@ const OF_THE_MODEL: f64 = 2.0 / 3.0;
 /// opened cases that were looked at it is 1.2 times at most of what is there, and mostly more than twice of what is none.
 const OF_A_RIPPLE: f64 = 0.5;
 const OFTENER: f64 = 1.6;
+/// Of the largest effect's amplitude, from which on it is none of what a ripple leaves: of that a quarter is lost at most (docs/decisions/0025). What
+/// rubs with the speed is large where a motor turns fast, and so shakes its cable.
+const LEFT_OF_A_RIPPLE: f64 = 0.5;
 /// Positions of the tip are published in whole micrometres: what does less than this to them (m RMS) is how they were computed.
 const TIP_RESOLUTION: f64 = 2e-6;
 /// No encoder tells less than this of a joint (rad or m RMS); a simulation without noise does.
@@ -85,14 +89,29 @@ impl Search<'_, '_> {
         let after = self.scorer.fit(&grams);
         let gain = self.significance(others, &scored.candidate);
         let shares = shares(&before, &after);
-        let mut start = 0;
-        let mut sizes: Vec<Vec<f64>> = Vec::new();
-        for candidate in others.iter().chain([&scored.candidate]) {
-            let theta = &after.coefficients[start..start + candidate.columns.len()];
-            start += theta.len();
-            sizes.push((0..shares.len()).map(|c| candidate.varies_by(c, theta)).collect());
-        }
+        let mut all = after.coefficients.as_slice();
+        let mut sized: Vec<(&Candidate, &[f64])> = others
+            .iter()
+            .chain([&scored.candidate])
+            .map(|own| (own, all.split_off(..own.columns.len()).unwrap_or_default()))
+            .collect();
+        let mut sizes: Vec<Vec<f64>> =
+            sized.iter().map(|(own, theta)| (0..shares.len()).map(|c| own.varies_by(c, theta)).collect()).collect();
         let own = sizes.pop().unwrap_or_default();
+        // A zero that is off is off by a constant: what else is there is no error of its form, unless it is one of the load of a cable that gives way in the
+        // simulation already.
+        let of_the_load = |own: &Candidate, theta: &[f64]| {
+            let compliance = own.family.joints.first().map_or(0.0, |joint| self.problem.nominal.compliance[*joint][0]);
+            own.family.physics == "cable_stretch" && theta.first().is_some_and(|x| x.abs() < OF_THE_LOAD * compliance)
+        };
+        for (size, other) in sizes.iter_mut().zip(others) {
+            if other.family.physics == "joint_offset"
+                && other.windows.is_none()
+                && !sized.last().is_some_and(|(own, theta)| of_the_load(own, theta))
+            {
+                size.fill(0.0);
+            }
+        }
         let amplitude = (0..shares.len())
             .filter(|c| shares[*c] >= self.thresholds.share)
             .map(|c| own[c] / sizes.iter().map(|s| s[c]).fold(1e-300, f64::max))
@@ -107,7 +126,8 @@ impl Search<'_, '_> {
         let enough =
             !self.problem.practical.is_known() || (0..shares.len()).any(|c| shares[c] >= self.thresholds.share && beyond(c));
         let begins_or_ends = others.is_empty() && scored.candidate.edges() > 0;
-        let ripples: Vec<&Candidate> = others.iter().filter(|other| other.family.physics == RIPPLE).collect();
+        let small = amplitude < LEFT_OF_A_RIPPLE;
+        let ripples: Vec<&Candidate> = others.iter().filter(|other| small && other.family.physics == RIPPLE).collect();
         let of_the_model = (begins_or_ends || !ripples.is_empty()) && {
             let effects: Vec<Vec<f64>> = (0..shares.len()).map(|c| scored.candidate.effect(c, theta)).collect();
             let left = [self.scorer.left(base, &before), self.scorer.left(&grams, &after)];
@@ -122,7 +142,9 @@ impl Search<'_, '_> {
         let share = shares.into_iter().fold(0.0, f64::max);
         let amplitude = if others.is_empty() { f64::INFINITY } else { amplitude };
         let resolved = |c: usize| own[c] > 0.0 && own[c] >= resolution(self.problem.cells[c].channel);
-        let enough = enough && (0..own.len()).any(resolved);
+        let of_simulation = family.joints.first().map_or(0.0, |joint| self.problem.nominal.drives[*joint][2]);
+        let possible = sized.pop().is_none_or(|fading| fades_within(fading, of_simulation, &sized));
+        let enough = enough && possible && (0..own.len()).any(resolved);
         let completes = completes(&scored.candidate, others);
         Judged { gain, share, of_the_model, amplitude: if enough { amplitude } else { -1.0 }, completes }
     }

@@ -2,7 +2,9 @@
 
 use super::likeliest::{likeliest_first, simpler_is_enough};
 use super::{Scored, Search, price};
-use crate::hypothesis::{BY_LOAD, Candidate, Family, Part, RIPPLE, are_parts, part, rounds, rub_together};
+use crate::hypothesis::{
+    BY_LOAD, Candidate, Family, IN_THE_PLANE, OUT_OF_PLANE, Part, RIPPLE, are_parts, may_fade, part, rounds, rub_together,
+};
 use crate::parallel;
 use crate::robot::Robot;
 use crate::score::{Fit, Gain, Grams, Scorer, within_bounds};
@@ -28,7 +30,10 @@ impl Search<'_, '_> {
         let grams = &self.grams(others, None);
         let base = self.scorer.fit(grams);
         self.scorer.untempered();
-        let mut all = best_claims(self.candidates.len(), &|k| self.score_of_start(grams, &base, &self.candidates[k]));
+        let mut all = best_claims(self.candidates.len(), &|k| {
+            let candidate = &self.candidates[k];
+            if may_fade(candidate, others) { self.score_of_start(grams, &base, candidate) } else { None }
+        });
         // Effects that begin or end on the way: the claims that do something, again, in windows.
         let windows = self.windows();
         all.sort_by(|a, b| b.seen.total_cmp(&a.seen));
@@ -57,9 +62,10 @@ impl Search<'_, '_> {
         let _ = parallel::map(worth, |(_, scored)| {
             self.run_by_run(grams, &base, scored);
             self.settle_shape(grams, &base, scored);
+            self.in_the_plane(grams, &base, scored);
         });
         sort(&mut claims);
-        self.round_alike(grams, &base, &mut claims);
+        self.round_alike(grams, &base, &mut claims, others);
         // What an edge that is not quite sharp, or not quite there, leaves of one effect is not another one, but for the other part of what rubs.
         // And of one joint's dry friction there is one level, and what ripples in a drive shakes its cable.
         let robot = self.problem.robot;
@@ -69,7 +75,7 @@ impl Search<'_, '_> {
         let rest = |s: &Scored| others.iter().any(|other| of(other, &s.candidate));
         claims.retain(|s| !rest(s));
         sort(&mut claims);
-        claims.extend(self.in_the_window_of_the_first(&claims, grams, &base));
+        claims.extend(self.in_the_window_of_the_first(&claims, grams, &base, others));
         claims.extend(self.refined_often_in_windows(grams, &base, &claims));
         claims.retain(|s| !rest(s));
         claims.extend(self.bent_where_a_memory_is(grams, &base, &claims));
@@ -77,7 +83,7 @@ impl Search<'_, '_> {
         sort(&mut claims);
         let mut claims = distinct(&claims);
         // One that was found in the window only may turn round otherwise than what stood first before.
-        self.round_alike(grams, &base, &mut claims);
+        self.round_alike(grams, &base, &mut claims, others);
         claims.retain(|s| !rest(s));
         sort(&mut claims);
         // Rivals are told apart by the rows that count once the best of them is in: what it leaves is its model's error, and
@@ -100,14 +106,30 @@ impl Search<'_, '_> {
         claims
     }
 
+    /// Of gravity that leaves the plane of all joints, a turn in it, if that does as well once it is refined.
+    fn in_the_plane(&self, grams: &Grams, base: &Fit, scored: &mut Scored) {
+        let (form, windows) = (scored.candidate.family.form, scored.candidate.windows.as_ref());
+        let Some(start) = self.candidates.iter().find(|c| form == OUT_OF_PLANE && c.family.form == IN_THE_PLANE) else { return };
+        let start = windows.map_or_else(|| start.clone(), |windows| start.within(self.problem, windows));
+        let Some(mut plain) = self.score(grams, base, &start) else { return };
+        self.settle_shape(grams, base, &mut plain);
+        if simpler_is_enough(scored, [&plain]) || plain.score >= scored.score - NO_BETTER {
+            *scored = plain;
+        }
+    }
+
     /// Everything once more in the window that was found with the best claim: the grid of windows takes each claim in the form
     /// that fits the whole of the runs best, and some are not tried in windows of their own.
-    fn in_the_window_of_the_first(&self, claims: &[Scored], grams: &Grams, base: &Fit) -> Vec<Scored> {
+    fn in_the_window_of_the_first(&self, claims: &[Scored], grams: &Grams, base: &Fit, others: &[Candidate]) -> Vec<Scored> {
         let best = claims.first().filter(|best| best.score > self.thresholds.nats);
         let Some((best, windows)) = best.and_then(|best| Some((best, best.candidate.windows.clone()?))) else { return Vec::new() };
         let mut forms = best_of(self.candidates.len(), Candidate::same_form, &|k| {
             let candidate = self.candidates[k].within(self.problem, &windows);
-            if candidate.shows() && candidate.family.may_have_edges() { self.score(grams, base, &candidate) } else { None }
+            if candidate.shows() && candidate.family.may_have_edges() && may_fade(&candidate, others) {
+                self.score(grams, base, &candidate)
+            } else {
+                None
+            }
         });
         sort(&mut forms);
         let mut forms = distinct_by(&forms, Candidate::same_form);
@@ -119,7 +141,7 @@ impl Search<'_, '_> {
 
     /// How a sign turns round belongs to the joint and not to the law: rivals of the best claim, which round otherwise and do worse, begin
     /// again from its numbers. A search over one more number than it has starts seldom finds them.
-    fn round_alike(&self, grams: &Grams, base: &Fit, claims: &mut [Scored]) {
+    fn round_alike(&self, grams: &Grams, base: &Fit, claims: &mut [Scored], others: &[Candidate]) {
         let Some((Scored { candidate: own, score: best, .. }, rivals)) = claims.split_first_mut() else { return };
         let rounding: Vec<(&str, f64)> =
             own.family.shape.iter().copied().zip(own.shape.iter().copied()).filter(|(name, _)| rounds(name)).collect();
@@ -134,7 +156,9 @@ impl Search<'_, '_> {
         };
         let again = |rival: &mut Scored| {
             let mut starts: Vec<Candidate> = Vec::new();
-            for start in self.candidates.iter().filter(|start| start.same_claim(&rival.candidate) && alike(&start.family)) {
+            let is_alike =
+                |start: &&Candidate| start.same_claim(&rival.candidate) && alike(&start.family) && may_fade(start, others);
+            for start in self.candidates.iter().filter(is_alike) {
                 let mut shape = start.shape.clone();
                 for (name, value) in &rounding {
                     if let Some(k) = start.family.shape.iter().position(|own| own == name) {
@@ -220,6 +244,9 @@ impl Search<'_, '_> {
         })
     }
 }
+
+/// What a turn out of the plane has to be better by than one in it, nats.
+const NO_BETTER: f64 = 3.0;
 
 /// How much of what a whole says its first part has to say at least beside the others, which may pull the whole the other way.
 const BORNE_OUT: f64 = 0.5;
