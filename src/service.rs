@@ -74,7 +74,7 @@ fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Option<Arguments
         match argument.as_str() {
             "--config" => match config.replace(PathBuf::from(value()?)) {
                 None => {}
-                Some(first) => return Err(format!("--config is given twice, first {first:?}; leave one")),
+                Some(first) => return Err(format!("--config is given twice, first \"{}\"; leave one", first.display())),
             },
             "--check-config" => check_only = true,
             "--test-hook" => hook = Some(test_hook(&value()?)?),

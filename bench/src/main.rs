@@ -264,6 +264,11 @@ fn through_shared_memory(waits: &[&str], service_core: usize, seconds: u64) -> R
     let mut row = path::hop(service_core, SERVICE_PRIORITY)?.to_vec();
     row.push(f64::NAN);
     table.row(path::HOP, &row);
+    if waits.contains(&"event") {
+        let mut row = path::woken_hop(service_core, SERVICE_PRIORITY)?.to_vec();
+        row.push(f64::NAN);
+        table.row(path::WOKEN_HOP, &row);
+    }
     for wait in waits {
         path::run(&mut table, wait, service_core, seconds)?;
     }

@@ -27,6 +27,7 @@ compare by ratio, within one table. `make bench-ci` is the short part; `RAVENPOS
   rows are of three processes, one after the other: compare them with one another.
 - *missed*: answers that did not come within 0.9 ms of the state; they count as 0.9 ms in the quantiles.
 - *spin* is measured with real-time throttling off, as it has to be for that ([machine.md](machine.md)): by root, for that long. With it on the kernel stops what spins for 50 of each 1000 ms.
+- *one hop*: both sides poll, in a row; *to a thread that an event wakes*: one that does nothing else, once a millisecond, which is what *event* adds to its own work.
 - *inference* is guard and network together, as the service measures them; one arm, position alone. Guard, recording and the rest apart:
   *A cycle's parts*.
 - The cost of a run is bytes over bandwidth: in the growth tables *floor* is that, the time to read the weights once from where they lie. Below some

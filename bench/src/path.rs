@@ -7,7 +7,7 @@ use crate::table::{Table, quantiles};
 use ravenpose::config::ModelSource;
 use ravenpose::realtime;
 use ravenpose::report::{StageStats, Stats};
-use ravenpose_transport::{Bell, Reader, Settings, Writer, now_ns, sleep_until_ns};
+use ravenpose_transport::{Bell, Listener, Reader, Settings, Writer, now_ns, sleep_until_ns};
 use ravenpose_wire::{ArmStatus, CorrectedPose, RavenState, features};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -410,12 +410,68 @@ fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<
     })
 }
 
+/// States of [`woken_hop`], the first of which do not count, and how long its other side waits for one.
+const WAKINGS: u64 = 5_000;
+const FIRST_WAKINGS: u64 = 500;
+const WAKING_MAX: Duration = Duration::from_millis(100);
+
+/// Quantiles of a message's way to a thread that an event wakes and that does nothing else, µs, once a millisecond: from before it is sent to when that
+/// thread, on the service's core, has it.
+pub(crate) fn woken_hop(service_core: usize, priority: i32) -> Result<[f64; 4], String> {
+    let link = OwnLink::new("woken");
+    let told = |error: ravenpose_transport::TransportError| error.to_string();
+    let stopped = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| {
+            for missing in [realtime::pin(service_core), realtime::set_fifo(priority)].into_iter().filter_map(Result::err) {
+                println!("note: {missing}");
+            }
+            let listener = Listener::open(&link.settings).map_err(told)?;
+            let reader: Reader<RavenState> = Reader::open(&link.settings, 1).map_err(told)?;
+            let mut ways = Vec::with_capacity(WAKINGS as usize);
+            while !stopped.load(std::sync::atomic::Ordering::Relaxed) {
+                if listener.wait(WAKING_MAX)
+                    && let Some(state) = reader.latest().map_err(told)?
+                    && state.sequence > FIRST_WAKINGS
+                {
+                    ways.push(now_ns() - state.source_time_ns);
+                }
+            }
+            Ok::<_, String>(ways)
+        });
+        let here = || -> Result<(), String> {
+            let writer: Writer<RavenState> = Writer::open(&link.settings).map_err(told)?;
+            let bell = Bell::open(&link.settings).map_err(told)?;
+            while writer.readers() == 0 || !bell.ring() {
+                if other.is_finished() {
+                    return Err("a hop could not be measured: the other side did not start".to_owned());
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            let mut next = now_ns();
+            for sequence in 1..=WAKINGS {
+                writer.send(&state(sequence)).map_err(told)?;
+                let _ = bell.ring();
+                next += PERIOD_NS * ((now_ns() - next) / PERIOD_NS + 1);
+                sleep_until_ns(next);
+            }
+            Ok(())
+        };
+        let sent = here();
+        stopped.store(true, std::sync::atomic::Ordering::Relaxed);
+        let ways = other.join().map_err(|_| "a part of the benchmark failed".to_owned())??;
+        sent.map(|()| ways)
+    })
+    .map(|mut ways| quantiles(&mut ways))
+}
+
 /// What is asked of the whole path, beside what these tables say: of each way of waiting that has its rows.
 pub(crate) fn asked(table: &Table, waits: &[&str]) -> Table {
     let mut all = Table::new("What is asked of the whole path, and what this run reached, us", &["asked", "reached", "met"]);
     let met = |asked: f64, reached: f64| [asked, reached, f64::from(u8::from(reached <= asked))];
-    let hop = table.find(HOP).map_or(f64::NAN, |row| row[0]);
     for wait in waits {
+        // Who waits for an event is woken, whatever it does then.
+        let hop = table.find(if *wait == "event" { WOKEN_HOP } else { HOP }).map_or(f64::NAN, |row| row[0]);
         let rows = table.rows_after(&format!("{wait}: "));
         let median = |name: &str| rows.iter().find(|(row, _)| row.trim() == name).and_then(|(_, values)| values.first().copied());
         let (Some(inference), Some(total), Some(whole)) = (median("inference"), median("total"), median("input_to_output")) else {
@@ -429,6 +485,9 @@ pub(crate) fn asked(table: &Table, waits: &[&str]) -> Table {
 
 /// Name of the row of [`hop`].
 pub(crate) const HOP: &str = "one hop through shared memory, half of there and back";
+
+/// Name of the row of [`woken_hop`].
+pub(crate) const WOKEN_HOP: &str = "one hop to a thread that an event wakes";
 
 /// Real-time throttling off for as long as this lives, as a thread that spins needs it (docs/machine.md): what it was comes back.
 struct Unthrottled {
