@@ -107,6 +107,19 @@ impl Set {
         }
     }
 
+    /// Arms unlike that of the examples: each effect once on each, and nothing.
+    fn arms(&mut self, severities: &[f64], nulls: usize) {
+        for robot in [Kind::Six, Kind::Planar, Kind::Gantry] {
+            for (index, physics) in PHYSICS.into_iter().enumerate() {
+                let effect = wanted(physics, severities[index % severities.len()]);
+                self.add("arms", vec![effect], |order| order.robot = robot);
+            }
+            for _ in 0..nulls {
+                self.add("arms", Vec::new(), |order| order.robot = robot);
+            }
+        }
+    }
+
     fn outside(&mut self, severities: &[f64], repeats: usize) {
         for physics in OUTSIDE {
             for repeat in 0..repeats {
@@ -215,6 +228,7 @@ fn full(seed: u64) -> Vec<Order> {
     set.standing(44);
     set.faulty(44, &[3.0, 10.0]);
     set.pairs(60, &[10.0, 30.0]);
+    set.arms(&[3.0, 10.0], 22);
     set.orders
 }
 
@@ -239,5 +253,6 @@ fn dev(seed: u64) -> Vec<Order> {
     set.standing(12);
     set.faulty(12, &[3.0]);
     set.pairs(20, &[30.0]);
+    set.arms(&[3.0], 6);
     set.orders
 }
