@@ -364,9 +364,7 @@ fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<
     let stopped = std::sync::atomic::AtomicBool::new(false);
     std::thread::scope(|scope| {
         let other = scope.spawn(|| {
-            for missing in [realtime::pin(service_core), realtime::set_fifo(priority)].into_iter().filter_map(Result::err) {
-                println!("note: {missing}");
-            }
+            as_the_service(service_core, priority);
             let reader: Reader<RavenState> = Reader::open(settings, 1).map_err(told)?;
             let writer: Writer<CorrectedPose> = Writer::open(settings).map_err(told)?;
             let mut pose = CorrectedPose::new();
@@ -410,6 +408,13 @@ fn trips(settings: &Settings, service_core: usize, priority: i32) -> Result<Vec<
     })
 }
 
+/// Makes this thread run as the service's loop does, as far as it may.
+fn as_the_service(core: usize, priority: i32) {
+    for missing in [realtime::pin(core), realtime::set_fifo(priority)].into_iter().filter_map(Result::err) {
+        println!("note: {missing}");
+    }
+}
+
 /// States of [`woken_hop`], the first of which do not count, and how long its other side waits for one.
 const WAKINGS: u64 = 5_000;
 const FIRST_WAKINGS: u64 = 500;
@@ -423,9 +428,7 @@ pub(crate) fn woken_hop(service_core: usize, priority: i32) -> Result<[f64; 4], 
     let stopped = std::sync::atomic::AtomicBool::new(false);
     std::thread::scope(|scope| {
         let other = scope.spawn(|| {
-            for missing in [realtime::pin(service_core), realtime::set_fifo(priority)].into_iter().filter_map(Result::err) {
-                println!("note: {missing}");
-            }
+            as_the_service(service_core, priority);
             let listener = Listener::open(&link.settings).map_err(told)?;
             let reader: Reader<RavenState> = Reader::open(&link.settings, 1).map_err(told)?;
             let mut ways = Vec::with_capacity(WAKINGS as usize);

@@ -27,17 +27,7 @@ pub(crate) fn draw_sized(size: usize, random: &mut Random) -> Arm {
     }
     let mut angle = || round(random.uniform(-1.0, 1.0));
     let mount = [FRAC_PI_2 + 0.6 * angle(), 0.5 * angle(), 0.0].map(round);
-    let mut arm = Arm {
-        name: format!("arm-{size}dof"),
-        mount,
-        joints,
-        links,
-        tip: [round(length), 0.0, 0.0],
-        drives: Vec::new(),
-        dry_law: DryLaw::Smooth(0.5),
-    };
-    arm.drives = drives(&arm, random);
-    arm
+    driven(&format!("arm-{size}dof"), mount, (joints, links), [round(length), 0.0, 0.0], random)
 }
 
 /// Two links that turn in one upright plane.
@@ -51,17 +41,7 @@ pub(crate) fn draw_planar(random: &mut Random) -> Arm {
         links.push(link(j, round(mass), length, random));
         mass *= random.uniform(0.4, 0.8);
     }
-    let mut arm = Arm {
-        name: "planar-2dof".into(),
-        mount: [0.0; 3],
-        joints,
-        links,
-        tip: [round(length), 0.0, 0.0],
-        drives: Vec::new(),
-        dry_law: DryLaw::Smooth(0.5),
-    };
-    arm.drives = drives(&arm, random);
-    arm
+    driven("planar-2dof", [0.0; 3], (joints, links), [round(length), 0.0, 0.0], random)
 }
 
 /// Slides along x and y, and one upwards, each of which carries the next.
@@ -73,15 +53,12 @@ pub(crate) fn draw_gantry(random: &mut Random) -> Arm {
         links.push(link(j, round(mass), 0.1, random));
         mass *= random.uniform(0.4, 0.7);
     }
-    let mut arm = Arm {
-        name: "gantry-3dof".into(),
-        mount: [0.0; 3],
-        joints,
-        links,
-        tip: [0.0, 0.0, -0.1],
-        drives: Vec::new(),
-        dry_law: DryLaw::Smooth(0.5),
-    };
+    driven("gantry-3dof", [0.0; 3], (joints, links), [0.0, 0.0, -0.1], random)
+}
+
+/// An arm with drives that suit it.
+fn driven(name: &str, mount: [f64; 3], (joints, links): (Vec<Joint>, Vec<Link>), tip: [f64; 3], random: &mut Random) -> Arm {
+    let mut arm = Arm { name: name.into(), mount, joints, links, tip, drives: Vec::new(), dry_law: DryLaw::Smooth(0.5) };
     arm.drives = drives(&arm, random);
     arm
 }
