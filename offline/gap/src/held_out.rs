@@ -54,6 +54,11 @@ pub(crate) fn sized<'a>(effects: &'a [Effect], estimates: &'a [Estimate]) -> Vec
     effects.iter().zip(estimates).map(|(effect, estimate)| (&effect.chosen.candidate, &estimate.coefficients[..])).collect()
 }
 
+/// The same of candidates whose coefficients stand in a row.
+pub(crate) fn sized_in_a_row<'a>(candidates: impl IntoIterator<Item = &'a Candidate>, mut all: &'a [f64]) -> Vec<Sized<'a>> {
+    candidates.into_iter().map(|own| (own, all.split_off(..own.columns.len()).unwrap_or_default())).collect()
+}
+
 /// All but one of them.
 pub(crate) fn others<'a>(all: &[Sized<'a>], without: usize) -> Vec<Sized<'a>> {
     all.iter().enumerate().filter(|(k, _)| *k != without).map(|(_, one)| *one).collect()

@@ -1,6 +1,7 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::cell::Channel;
+use crate::held_out::{Sized, sized_in_a_row};
 use crate::hypothesis::{
     AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, OUT_OF_PLANE, ROTOR, START, STRIBECK_RANGE, are_parts,
     levels_what_fades, rounds,
@@ -93,7 +94,7 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
 const OF_THE_OTHER_PART: f64 = 0.01;
 
 /// How much of a part of what rubs at a joint would fit the other part, alone.
-fn as_the_other_part(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
+fn as_the_other_part(candidates: &[Sized], k: usize) -> f64 {
     let (own, _) = candidates[k];
     let others = candidates.iter().filter(|(other, _)| are_parts(own, other));
     let product: f64 = others
@@ -106,7 +107,7 @@ fn as_the_other_part(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
 const BEGAN_S: f64 = 0.5;
 
 /// How much of a level friction beside it has faded by, or has not, in the time by which that began otherwise than supposed.
-fn as_faded(candidates: &[(&Candidate, &[f64])], k: usize) -> f64 {
+fn as_faded(candidates: &[Sized], k: usize) -> f64 {
     let (own, _) = candidates[k];
     let fading = candidates.iter().filter(|(other, _)| levels_what_fades(own, other));
     fading.map(|(other, theta)| theta[0] * BEGAN_S / other.shape_of("T").unwrap_or(f64::INFINITY)).sum()
@@ -117,12 +118,10 @@ pub(crate) const OF_THE_LOAD: f64 = 0.12;
 
 /// How much a spring's parameter, or that of a zero that is off beside it, may be wrong by since its load is: the zero takes what does not change of the
 /// spring's effect, and leaves it as much less to be known by.
-fn as_loaded(problem: &Problem, candidates: &[(&Candidate, &[f64])], k: usize, value: f64) -> f64 {
+fn as_loaded(problem: &Problem, candidates: &[Sized], k: usize, value: f64) -> f64 {
     let (own, _) = candidates[k];
     let of = |physics: &str| {
-        let there = |(other, _): &&(&Candidate, &[f64])| {
-            other.family.physics == physics && other.family.joints == own.family.joints && other.windows.is_none()
-        };
+        let there = |(other, _): &&Sized| other.is_of(physics, &own.family.joints) && other.windows.is_none();
         candidates.iter().find(there)
     };
     let Some(((spring, theta), (zero, _))) = of("cable_stretch").zip(of("joint_offset")) else { return 0.0 };
@@ -139,7 +138,7 @@ fn as_loaded(problem: &Problem, candidates: &[(&Candidate, &[f64])], k: usize, v
 }
 
 /// All dry friction of a drive that fades, if some of it was found: what the simulation has as well.
-fn all_that_fades(candidates: &[(&Candidate, &[f64])], k: usize, nominal: &Nominal) -> Option<f64> {
+fn all_that_fades(candidates: &[Sized], k: usize, nominal: &Nominal) -> Option<f64> {
     let (fading, _) = candidates[k];
     let mut found = candidates.iter().filter(|(level, _)| levels_what_fades(level, fading)).peekable();
     let _ = found.peek()?;
@@ -338,13 +337,9 @@ fn of_candidates(
     let fit = scorer.fit(&plain);
     let mut grams = scorer.empty();
     let mut layout = Vec::new();
-    let (mut start, mut column) = (0, 0);
-    let mut sizes = fit.coefficients.as_slice();
-    let sized: Vec<(&Candidate, &[f64])> =
-        candidates.iter().map(|own| (*own, sizes.split_off(..own.columns.len()).unwrap_or_default())).collect();
-    for candidate in candidates {
-        let theta = &fit.coefficients[start..start + candidate.columns.len()];
-        start += theta.len();
+    let mut column = 0;
+    let sized = sized_in_a_row(candidates.iter().copied(), &fit.coefficients);
+    for (candidate, theta) in &sized {
         let slopes = slopes(dictionary, candidate, theta);
         let mut columns = candidate.columns.to_vec();
         columns.extend(slopes.iter().map(|(_, slope)| slope.clone()));

@@ -25,6 +25,11 @@ fn of_severity(physics: &str, joint: usize, severity: f64) -> Wanted {
     Wanted { severity: Some(severity), ..wanted(physics, Some(joint), &[]) }
 }
 
+/// Dry friction that the simulation lacks, and all of it fades or grows.
+fn fading() -> Vec<Wanted> {
+    vec![of_severity("coulomb_friction", 1, 20.0), of_severity("thermal_drift", 1, 10.0)]
+}
+
 #[test]
 fn a_zero_that_is_off_and_a_soft_cable_are_no_memory_of_the_cable() {
     // They were hysteresis of 8.5 N m/rad that yields at 0.5 rad, with intervals from nothing to 18 times that.
@@ -39,8 +44,7 @@ fn a_zero_that_is_off_and_a_soft_cable_are_no_memory_of_the_cable() {
 fn what_was_found_of_friction_fades_as_well() {
     // No more could fade than the simulation has: kappa stood at its end, and was of the simulation's friction alone.
     let folder = Folder::new("grows");
-    let effects = vec![of_severity("coulomb_friction", 1, 20.0), of_severity("thermal_drift", 1, 10.0)];
-    let report = told(&folder, 99_041, "c41", Kind::Gantry, effects, 15.0);
+    let report = told(&folder, 99_041, "c41", Kind::Gantry, fading(), 15.0);
     holds(of(&report, "coulomb_friction"), "f_c", 8.577, 0.1);
     holds(of(&report, "thermal_drift"), "kappa_T", -0.6, 0.2);
     holds(of(&report, "thermal_drift"), "T", 23.9, 0.6);
@@ -50,8 +54,7 @@ fn what_was_found_of_friction_fades_as_well() {
 fn friction_that_has_faded_half_has_not_ended() {
     // It was dry friction that ends after four seconds.
     let folder = Folder::new("fades");
-    let effects = vec![of_severity("coulomb_friction", 1, 20.0), of_severity("thermal_drift", 1, 10.0)];
-    let report = told(&folder, 99_043, "c43", Kind::Planar, effects, 15.0);
+    let report = told(&folder, 99_043, "c43", Kind::Planar, fading(), 15.0);
     assert!(of(&report, "coulomb_friction").location.time_intervals.is_empty());
     near(of(&report, "thermal_drift"), "kappa_T", 0.6, 0.15);
 }

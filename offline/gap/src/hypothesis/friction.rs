@@ -6,6 +6,7 @@ use super::dictionary::{Dictionary, size, times};
 use super::signs::{Place, Sign, Turn};
 use super::{Bound, Candidate, Family, Valley, product};
 use crate::cell::Channel;
+use crate::held_out::Sized;
 
 /// Travel over which friction turns round, as shares of a joint's usual travel. Below break-away a bristle keeps its force, which
 /// a rigid sign does not: a joint at rest holds what it came with.
@@ -91,10 +92,9 @@ const FOUND_FADES: &str = "friction fades, what was found as well";
 
 /// Is dry friction, all the time, beside friction of its joint that fades?
 pub(crate) fn levels_what_fades(level: &Candidate, fading: &Candidate) -> bool {
-    let has_level = level.family.physics != BY_LOAD || level.is_by_load_and_level();
     [FADES, FOUND_FADES].contains(&fading.family.form)
         && part(level) == Some(Part::Dry)
-        && has_level
+        && level.has_level()
         && level.windows.is_none()
         && level.family.joints == fading.family.joints
 }
@@ -109,7 +109,7 @@ pub(crate) fn may_fade(candidate: &Candidate, beside: &[Candidate]) -> bool {
 }
 
 /// Does friction fade, or grow, by no more than there is of it: in the simulation, and found besides, with these coefficients?
-pub(crate) fn fades_within(fading: (&Candidate, &[f64]), of_simulation: f64, beside: &[(&Candidate, &[f64])]) -> bool {
+pub(crate) fn fades_within(fading: Sized, of_simulation: f64, beside: &[Sized]) -> bool {
     let (own, theta) = fading;
     let found = beside.iter().filter(|(level, _)| levels_what_fades(level, own)).map(|(level, theta)| level.level_of(theta));
     own.family.form != FOUND_FADES || of_simulation <= 0.0 || theta[0].abs() <= of_simulation + found.sum::<f64>()
@@ -189,8 +189,10 @@ fn push_side(dictionary: &Dictionary, j: usize, forms: [&'static str; 3], at_lin
             let family = Family::shaped(BY_LOAD, &[j], form, TORQUE, &[positive, positive], names, starts.clone(), with_level);
             all.push(family.penalised(3.0 + more));
         }
-        let fading = [(FADES, fades, &BEFORE_S[..]), (FOUND_FADES, Bound::Free, &BEFORE_S[..1])];
-        for (form, bound, before) in fading.into_iter().filter(|_| !at_link) {
+        if at_link {
+            continue;
+        }
+        for (form, bound, before) in [(FADES, fades, &BEFORE_S[..]), (FOUND_FADES, Bound::Free, &BEFORE_S[..1])] {
             let heated = product(&[&HEATING_S, before]);
             all.push(
                 Family::shaped(

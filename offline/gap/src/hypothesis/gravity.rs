@@ -38,8 +38,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let weights = Weights::new(dictionary);
     let tangents = turned(dictionary, &[0.0; 2]);
     let weight = dictionary.difference(dictionary.believed(), &dictionary.loads_of(&weightless(dictionary)), 1.0, true);
-    let size = |column: &Column| weights.dot(column, column).sqrt();
-    if tangents.iter().all(|tangent| size(tangent) <= NOT_SEEN * size(&weight)) {
+    if tangents.iter().all(|tangent| weights.size(tangent) <= NOT_SEEN * weights.size(&weight)) {
         return;
     }
     all.push(Family::secant("gravity_direction", &[], "turned", TORQUE, &[FURTHEST; 2], &["a", "b"], |d, s| turned(d, s).into()));
@@ -87,7 +86,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
 /// The axis about which alone a turn is seen in the first order: joints that are all parallel turn in a plane, and a turn out of it that is as
 /// large as may be fits noise.
 fn only_axis(tangents: &[Column; 2], weights: &Weights) -> Option<usize> {
-    let sizes = tangents.each_ref().map(|column| weights.dot(column, column).sqrt());
+    let sizes = tangents.each_ref().map(|column| weights.size(column));
     let largest = usize::from(sizes[1] > sizes[0]);
     (sizes[1 - largest] < TOLD_APART * sizes[largest]).then_some(largest)
 }
@@ -145,7 +144,7 @@ fn most(parameters: &[f64; PARAMETERS], k: usize) -> f64 {
 fn told_apart(d: &Dictionary, weights: &Weights, about: &[f64; 2]) -> Vec<Number> {
     let turned = turned(d, about);
     let numbers: Vec<Number> = (0..d.joints()).flat_map(|link| (0..OF_GRAVITY).map(move |k| (link, k))).collect();
-    let size = |column: &Column| weights.dot(column, column).sqrt();
+    let size = |column: &Column| weights.size(column);
     let columns = of_numbers(d, about, &numbers, &weights.apart(&turned));
     let mut left: Vec<(Number, f64, Column)> =
         numbers.into_iter().zip(columns).map(|(number, column)| (number, size(&column), column)).collect();
@@ -186,6 +185,10 @@ impl Weights {
 
     fn dot(&self, x: &Column, y: &Column) -> f64 {
         x.products(y).map(|(cell, product)| product * self.0[cell]).sum()
+    }
+
+    fn size(&self, column: &Column) -> f64 {
+        self.dot(column, column).sqrt()
     }
 
     /// What of a column is not along another one.

@@ -472,6 +472,21 @@ impl Candidate {
         self.family.physics == BY_LOAD && self.columns.len() > 1
     }
 
+    /// Of dry friction: is a part of it there without any load?
+    pub(crate) fn has_level(&self) -> bool {
+        self.family.physics != BY_LOAD || self.is_by_load_and_level()
+    }
+
+    /// The same at the same time as others are; none: always.
+    pub(crate) fn when(&self, problem: &crate::problem::Problem, windows: Option<&Windows>) -> Self {
+        windows.map_or_else(|| self.clone(), |windows| self.within(problem, windows))
+    }
+
+    /// Is it this physics at these joints?
+    pub(crate) fn is_of(&self, physics: &str, joints: &[usize]) -> bool {
+        self.family.physics == physics && self.family.joints == joints
+    }
+
     /// Of dry friction with these coefficients, the level that no load is needed for.
     pub(crate) fn level_of(&self, coefficients: &[f64]) -> f64 {
         coefficients.get(usize::from(self.is_by_load_and_level())).copied().unwrap_or(0.0)

@@ -139,7 +139,7 @@ impl Search<'_, '_> {
     ) -> Vec<Scored> {
         let candidates = self.candidates.iter().filter(|c| !c.family.limits.is_empty() && worth(c));
         let scored = parallel::map(candidates.collect::<Vec<_>>(), |c| {
-            let candidate = windows.map_or_else(|| c.clone(), |windows| c.within(self.problem, windows));
+            let candidate = c.when(self.problem, windows);
             if candidate.shows() { self.score(grams, base, &candidate) } else { None }
         });
         let mut starts: Vec<Scored> = scored.into_iter().flatten().collect();

@@ -3,6 +3,7 @@
 use super::explained::explained;
 use super::{Scored, Search, price};
 use crate::cell::Channel;
+use crate::held_out::{left, sized_in_a_row};
 use crate::hypothesis::{Candidate, RIPPLE, WALL, are_parts, fades_within, rub_together, shaken};
 use crate::intervals::OF_THE_LOAD;
 use crate::noise::Noise;
@@ -89,12 +90,7 @@ impl Search<'_, '_> {
         let after = self.scorer.fit(&grams);
         let gain = self.significance(others, &scored.candidate);
         let shares = shares(&before, &after);
-        let mut all = after.coefficients.as_slice();
-        let mut sized: Vec<(&Candidate, &[f64])> = others
-            .iter()
-            .chain([&scored.candidate])
-            .map(|own| (own, all.split_off(..own.columns.len()).unwrap_or_default()))
-            .collect();
+        let mut sized = sized_in_a_row(others.iter().chain([&scored.candidate]), &after.coefficients);
         let mut sizes: Vec<Vec<f64>> =
             sized.iter().map(|(own, theta)| (0..shares.len()).map(|c| own.varies_by(c, theta)).collect()).collect();
         let own = sizes.pop().unwrap_or_default();
@@ -193,18 +189,8 @@ impl Search<'_, '_> {
 
     /// What a set leaves of each cell.
     pub(super) fn residuals(&self, all: &[&Candidate], fit: &Fit) -> Vec<Vec<f64>> {
-        (0..self.problem.cells.len())
-            .map(|c| {
-                let mut left = self.problem.cells[c].residual.clone();
-                let mut start = 0;
-                for own in all {
-                    let theta = &fit.coefficients[start..start + own.columns.len()];
-                    start += theta.len();
-                    own.take_off(c, theta, &mut left);
-                }
-                self.problem.nuisances[c].without(&left)
-            })
-            .collect()
+        let sized = sized_in_a_row(all.iter().copied(), &fit.coefficients);
+        (0..self.problem.cells.len()).map(|c| self.problem.nuisances[c].without(&left(self.problem, c, &sized))).collect()
     }
 
     pub(super) fn accepts(&self, scored: &Scored, judged: &Judged) -> bool {

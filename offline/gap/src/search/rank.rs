@@ -3,7 +3,7 @@
 use super::likeliest::{likeliest_first, simpler_is_enough};
 use super::{Scored, Search, price};
 use crate::hypothesis::{
-    BY_LOAD, Candidate, Family, IN_THE_PLANE, OUT_OF_PLANE, Part, RIPPLE, are_parts, may_fade, part, rounds, rub_together,
+    Candidate, Family, IN_THE_PLANE, OUT_OF_PLANE, Part, RIPPLE, are_parts, may_fade, part, rounds, rub_together,
 };
 use crate::parallel;
 use crate::robot::Robot;
@@ -108,9 +108,11 @@ impl Search<'_, '_> {
 
     /// Of gravity that leaves the plane of all joints, a turn in it, if that does as well once it is refined.
     fn in_the_plane(&self, grams: &Grams, base: &Fit, scored: &mut Scored) {
-        let (form, windows) = (scored.candidate.family.form, scored.candidate.windows.as_ref());
-        let Some(start) = self.candidates.iter().find(|c| form == OUT_OF_PLANE && c.family.form == IN_THE_PLANE) else { return };
-        let start = windows.map_or_else(|| start.clone(), |windows| start.within(self.problem, windows));
+        if scored.candidate.family.form != OUT_OF_PLANE {
+            return;
+        }
+        let Some(start) = self.candidates.iter().find(|c| c.family.form == IN_THE_PLANE) else { return };
+        let start = start.when(self.problem, scored.candidate.windows.as_ref());
         let Some(mut plain) = self.score(grams, base, &start) else { return };
         self.settle_shape(grams, base, &mut plain);
         if simpler_is_enough(scored, [&plain]) || plain.score >= scored.score - NO_BETTER {
@@ -260,8 +262,7 @@ fn levels_twice(one: &Candidate, other: &Candidate) -> bool {
     if !rub_together(one, other) || [one, other].iter().any(|own| part(own) != Some(Part::Dry)) {
         return false;
     }
-    let has_level = |candidate: &Candidate| candidate.family.physics != BY_LOAD || candidate.is_by_load_and_level();
-    (has_level(one) && has_level(other)) || cosine(one, other).abs() > ONE
+    (one.has_level() && other.has_level()) || cosine(one, other).abs() > ONE
 }
 
 /// Cosine between the first columns of two candidates.

@@ -111,7 +111,7 @@ impl Search<'_, '_> {
     fn curve_for_a_square(&mut self, chosen: &[Candidate]) -> Vec<Vec<Candidate>> {
         let mut sets = Vec::new();
         for square in chosen.iter().filter(|own| own.family.form == SQUARED) {
-            let there = |physics: &str, own: &Candidate| own.family.physics == physics && own.family.joints == square.family.joints;
+            let there = |physics: &str, own: &Candidate| own.is_of(physics, &square.family.joints);
             let is_dry = |own: &Candidate| part(own) == Some(Part::Dry) && own.family.joints == square.family.joints;
             let viscous = self.candidates.iter().find(|c| there("viscous_friction", c)).cloned();
             if !chosen.iter().any(is_dry) || chosen.iter().any(|own| there("viscous_friction", own)) {
@@ -135,16 +135,14 @@ impl Search<'_, '_> {
         for memory in chosen.iter().filter(|own| own.family.physics == "cable_hysteresis" && own.windows.is_none()) {
             let rest: Vec<Candidate> = chosen.iter().filter(|own| !own.same_claim(memory)).cloned().collect();
             let of_joint = |all: &[Scored], physics: &str| {
-                let there =
-                    |one: &&Scored| one.candidate.family.physics == physics && one.candidate.family.joints == memory.family.joints;
-                all.iter().find(there).map(|one| one.candidate.clone())
+                all.iter().find(|one| one.candidate.is_of(physics, &memory.family.joints)).map(|one| one.candidate.clone())
             };
             let Some(spring) = of_joint(&self.rank(&rest), "cable_stretch") else { continue };
             let with: Vec<Candidate> = rest.iter().cloned().chain([spring]).collect();
             let beside = self.rank(&with);
             // Under a load that never changes sides play is a zero that is off; the latter is told first.
             for physics in ["joint_offset", "backlash"] {
-                if !rest.iter().any(|own| own.family.physics == physics && own.family.joints == memory.family.joints)
+                if !rest.iter().any(|own| own.is_of(physics, &memory.family.joints))
                     && let Some(more) = of_joint(&beside, physics)
                 {
                     let mut set: Vec<Candidate> = with.iter().cloned().chain([more]).collect();
