@@ -81,7 +81,8 @@ fn nothing_of(input: &Path, what: &str, damage: Option<&Damage>) -> String {
     format!("{}: {why}; nothing was written", input.display())
 }
 
-fn note_all(losses: &[&str]) {
+/// Says what a format cannot hold.
+pub(crate) fn note_all(losses: &[&str]) {
     for loss in losses {
         say!("note: {loss}");
     }

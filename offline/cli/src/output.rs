@@ -1,26 +1,17 @@
 //! Output files appear whole or not at all; what is said goes where somebody still listens.
 
+use atomic_write_file::AtomicWriteFile;
 use std::fmt::Arguments;
-use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
 
-/// Writes through `write` into a file beside `path`, then renames it; on any failure nothing is left.
+/// Writes through `write` into a file that is there when it is complete; on any failure, and when a signal ends the program, nothing is left.
 pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), String>) -> Result<(), String> {
-    // Hidden, for one that a signal leaves behind.
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let aside = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
     let failed = |cause: std::io::Error| unwritten(path, &cause);
-    let file = File::create(&aside).map_err(failed)?;
-    let mut buffered = BufWriter::new(file);
-    let written = write(&mut buffered)
-        .and_then(|()| buffered.flush().map_err(failed))
-        .and_then(|()| buffered.get_ref().sync_all().map_err(failed))
-        .and_then(|()| fs::rename(&aside, path).map_err(failed));
-    if written.is_err() {
-        let _ = fs::remove_file(&aside);
-    }
-    written
+    let mut buffered = BufWriter::new(AtomicWriteFile::open(path).map_err(failed)?);
+    write(&mut buffered)?;
+    let file = buffered.into_inner().map_err(|error| failed(error.into_error()))?;
+    file.commit().map_err(failed)
 }
 
 /// Writes bytes so.
@@ -55,16 +46,24 @@ pub(crate) fn check_file(out: &Path, inputs: &[&Path]) -> Result<(), String> {
         Ok(there) if !there.is_file() => {
             Err(format!("{}: is no file, and would be replaced by one; choose another output", out.display()))
         }
-        _ => Ok(()),
+        _ => check_writable(out, folder.unwrap_or(Path::new("."))),
     }
 }
 
 /// Can a folder be made there, or is it one? Asked before the work whose results it is for; `option` gives it.
 pub(crate) fn check_folder(out: &Path, option: &str) -> Result<(), String> {
-    match out.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir()) {
-        Some(file) => Err(format!("{}: is a file; give a folder with {option}", file.display())),
-        None => Ok(()),
+    match out.ancestors().find(|path| path.exists()) {
+        Some(file) if !file.is_dir() => Err(format!("{}: is a file; give a folder with {option}", file.display())),
+        Some(folder) => check_writable(out, folder),
+        // A name without a folder, not there yet.
+        None => check_writable(out, Path::new(".")),
     }
+}
+
+/// Can there be another file in a folder? Nothing is left of the one that is tried.
+fn check_writable(out: &Path, folder: &Path) -> Result<(), String> {
+    let tried = AtomicWriteFile::open(folder.join(".ravenpose")).and_then(AtomicWriteFile::discard);
+    tried.map_err(|cause| unwritten(out, &cause))
 }
 
 /// Says a line on standard output; see [`say`].

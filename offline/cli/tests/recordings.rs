@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Folder, done, errors, ravenpose, refused, text, with_effect};
+use common::{Folder, done, errors, program, ravenpose, refused, text, with_effect};
 use recordings::csv;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -404,6 +404,64 @@ fn bad_input_gets_one_line_and_nothing_is_left() {
         &["cable_creep on joint 5"],
     );
     assert_eq!(std::fs::read_dir(&runs).map_or(0, Iterator::count), 0);
+}
+
+#[test]
+fn what_is_killed_leaves_nothing_half_written() {
+    let folder = Folder::new("killed");
+    let out = folder.file("runs");
+    done(&["simulate", "--minutes", "0.5", "--seed", "3", "--out", text(&out)]);
+    let names = || {
+        let of = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("entry").file_name().into_string().expect("UTF-8");
+        let mut names: Vec<String> = std::fs::read_dir(&out).expect("folder").map(of).collect();
+        names.sort();
+        names
+    };
+    let before = names();
+    let mut cut_short = 0;
+    for ending in ["mcap", "bag", "parquet", "csv.gz", "rvs", "txt"] {
+        let made = out.join(format!("made.{ending}"));
+        for wait_ms in [20, 60, 150] {
+            let mut convert = program();
+            let convert =
+                convert.args(["convert", text(&out.join("run_0001.mcap")), text(&made)]).stdout(std::process::Stdio::null());
+            let mut convert = convert.spawn().expect("ravenpose runs");
+            std::thread::sleep(std::time::Duration::from_millis(wait_ms));
+            convert.kill().expect("killed");
+            let _status = convert.wait().expect("status");
+            if made.exists() {
+                done(&["info", text(&made)]);
+                std::fs::remove_file(&made).expect("made");
+            } else {
+                cut_short += 1;
+            }
+            assert_eq!(names(), before, "{ending}, killed after {wait_ms} ms");
+        }
+    }
+    assert!(cut_short > 0, "every conversion was done before it was killed");
+}
+
+#[test]
+fn where_nothing_can_be_written_is_said_before_the_work() {
+    // None of the inputs is there: the output is looked at first.
+    for command in [
+        &["evaluate", "--model", "none.onnx", "--data", "none.mcap", "--out", "/proc/ravenpose"][..],
+        &["gap", "--real", "none.csv", "--sim", "none.csv", "--robot", "none.urdf", "--out", "/proc/ravenpose"],
+        &["convert", "none.mcap", "/proc/ravenpose.csv"],
+        &["train", "--data", "none.mcap", "--out", "/proc/ravenpose.onnx"],
+    ] {
+        refused(&ravenpose(command), &["/proc/ravenpose", "cannot be written"]);
+    }
+}
+
+#[test]
+fn a_simulation_into_a_format_without_truth_says_so() {
+    let folder = Folder::new("truthless");
+    for (format, told) in [("rvs", true), ("txt", true), ("mcap", false)] {
+        let output = simulate(&folder.file(format), &["--format", format]);
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(said.lines().any(|line| line.starts_with("note: ") && line.contains("truth")), told, "{format}: {said}");
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Onto the disk: report.json and report.html, each written under another name and then renamed, so that nobody reads half a
 //! file.
 
+use atomic_write_file::AtomicWriteFile;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -58,16 +59,8 @@ pub fn json(report: &Report) -> Result<String, WriteError> {
 
 /// A file as a whole or not at all.
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let temporary = path.with_file_name(format!(".{name}.{}", std::process::id()));
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    written.map_err(|source| {
-        // What cannot be removed either is told by the first error.
-        let _ = std::fs::remove_file(&temporary);
-        WriteError::File { path: path.to_owned(), source }
-    })
+    let written = AtomicWriteFile::open(path).and_then(|mut whole| whole.write_all(bytes).and_then(|()| whole.commit()));
+    written.map_err(|source| WriteError::File { path: path.to_owned(), source })
 }
 
 /// A time as RFC 3339 in UTC to the second, such as `2026-01-15T10:00:00Z`, for [`Report::created`].

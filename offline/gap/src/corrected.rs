@@ -15,7 +15,7 @@ use crate::found::Found;
 use crate::given::Given;
 use crate::hypothesis::{
     ALWAYS, AT_MOTOR, Candidate, DRIFTS, LATE_COUPLING, LATE_TORQUES, NEVER, SENSOR, TOOL_LENGTH, TOOL_TWIST, WITH_OTHER_LINKS,
-    Window, direction,
+    Window, direction, shift,
 };
 use crate::intervals::Estimate;
 use crate::known;
@@ -353,9 +353,10 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate, window: 
         }
         ("link_geometry", form) => {
             let link = joint.ok_or("it has no link")?;
-            if let Some(axis) = family.side().strip_prefix("moved along ") {
-                let sign =
-                    along_its_length(found, link, axis).ok_or("a link moved across its length is not a term of the simulator")?;
+            if let Some(shift) = shift(&found.robot.arm, family) {
+                // A RAVEN-II's insertion is longer along x, which no frame before it shows.
+                let longer = shift.longer.filter(|_| found.robot.with_wrist.is_none() || !found.robot.prismatic[link]);
+                let sign = longer.ok_or("a link moved across its length is not a term of the simulator")?;
                 parameters = Parameters::of(&[("d_length", sign * estimate.coefficients[0])]);
             }
             // The tool comes after the last link.
@@ -421,24 +422,6 @@ fn as_effect(found: &Found, candidate: &Candidate, estimate: &Estimate, window: 
     let told = if name == family.physics { family.form.to_owned() } else { format!("{} {}", family.physics, family.form) };
     effect.source = Some(format!("ravenpose gap ({told})"));
     Ok((effect, sign))
-}
-
-/// Is an axis of the frame before a link the one along which the simulator makes it longer? 1, or -1 the other way.
-fn along_its_length(found: &Found, link: usize, axis: &str) -> Option<f64> {
-    let axis = match axis {
-        "x" => Vector3::x(),
-        "y" => Vector3::y(),
-        _ => Vector3::z(),
-    };
-    let body = found.robot.arm.bodies().get(link)?;
-    // A RAVEN-II's insertion is longer along x, which no frame before it shows.
-    if found.robot.with_wrist.is_some() && found.robot.prismatic[link] {
-        return None;
-    }
-    let way = body.placement.translation.vector;
-    let along = way.try_normalize(1e-9).unwrap_or_else(|| body.placement.rotation * body.joint.axis.normalize());
-    let share = along.dot(&axis);
-    (share.abs() > 0.99).then(|| share.signum())
 }
 
 /// Sizes that cannot be negative, of what the model may hold too much of.

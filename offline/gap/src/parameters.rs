@@ -1,7 +1,8 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
 use crate::hypothesis::{
-    Candidate, DRIFTS, GROUND, HEATING_S, OUT_OF_PLANE, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, torque_scale,
+    Candidate, DRIFTS, GROUND, HEATING_S, OUT_OF_PLANE, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, shift,
+    torque_scale,
 };
 use crate::nominal::Nominal;
 use crate::robot::Robot;
@@ -145,7 +146,10 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             named("period", position, shaped("period")),
         ],
         ("link_geometry", form) if TWISTED.contains(&form) || form == TOOL_TWIST => vec![named("d_alpha", "rad", theta[0])],
-        ("link_geometry", _) => vec![named("d_length", "m", theta[0])],
+        ("link_geometry", _) => {
+            let sign = shift(&robot.arm, family).map_or(1.0, |shift| shift.sign);
+            vec![named("d_length", "m", sign * theta[0])]
+        }
         // Joint encoders that come early against the motors' are motors that come late: nothing is measured ahead of time.
         ("measurement_delay", "joint encoders") => vec![named("d", "s", theta[0].abs())],
         ("measurement_delay", _) => {

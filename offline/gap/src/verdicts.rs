@@ -15,7 +15,7 @@ use crate::corrected::Corrected;
 use crate::found::{Found, Outcome};
 use crate::given::{Given, Options};
 use crate::held_out::Refused;
-use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window};
+use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window, shift};
 use crate::intervals::{Edge, Estimate};
 use crate::pictures;
 use crate::robot::Robot;
@@ -321,6 +321,7 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
                 .into_iter()
                 .filter(|n| n.value.is_finite())
                 .map(|n| Parameter::new(n.name, n.value, n.unit, [n.value, n.value]))
+                .map(|parameter| with_its_way(found.robot, &rival.candidate, parameter))
                 .collect();
             Verdict::alternative(
                 number,
@@ -358,9 +359,17 @@ fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) ->
             if let Some(unit) = unit_of_coupling(found.robot, candidate, named.name) {
                 parameter.extra.set(gap_report::TRUE_UNIT, unit);
             }
-            parameter.method(gap_report::CiMethod::Sandwich)
+            with_its_way(found.robot, candidate, parameter.method(gap_report::CiMethod::Sandwich))
         })
         .collect()
+}
+
+/// A link that is not longer but moved: which way.
+fn with_its_way(robot: &Robot, candidate: &Candidate, mut parameter: Parameter) -> Parameter {
+    if let Some(along) = shift(&robot.arm, &candidate.family).and_then(|shift| shift.along) {
+        parameter.extra.set(gap_report::ALONG, along);
+    }
+    parameter
 }
 
 /// Name and link of the site where a payload was found.

@@ -9,11 +9,13 @@ use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
 use crate::{figures, load, onnx};
 use arm::Raven2;
+use atomic_write_file::AtomicWriteFile;
 use ravenpose::correction::Quantity;
 use ravenpose::load::LoadCard;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// One row of training in so many has a memory that began a few seconds before.
@@ -244,14 +246,10 @@ fn write_model(out: &Path, chain: &Chain, card: &BTreeMap<String, String>) -> Re
     write_whole(&beside(out, "sha256"), format!("{digest}  {name}\n").as_bytes())
 }
 
-/// Writes a file aside and renames it.
+/// Writes a file that is there when it is complete.
 pub(crate) fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), TrainingError> {
-    let aside = beside(file, "new");
-    let written = fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, file));
-    written.map_err(|error| {
-        drop(fs::remove_file(&aside));
-        TrainingError::file(file, format!("cannot be written: {error}"), "choose another --out")
-    })
+    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(bytes).and_then(|()| whole.commit()));
+    written.map_err(|error| TrainingError::file(file, format!("cannot be written: {error}"), "choose another --out"))
 }
 
 /// A model that [`train`] wrote.

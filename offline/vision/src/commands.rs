@@ -10,7 +10,9 @@ use crate::outcome::Tracked;
 use crate::rig::{self, Rig};
 use crate::table::read_picks;
 use crate::track::{self, Mode};
+use atomic_write_file::AtomicWriteFile;
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A calibrated rig.
@@ -217,11 +219,6 @@ pub fn truth_text(tracked: &Tracked) -> String {
 
 /// A file appears whole or not at all.
 pub(crate) fn whole(file: &Path, text: &str) -> Result<()> {
-    let aside = file.with_extension(format!("part{}", std::process::id()));
-    let written = std::fs::write(&aside, text).and_then(|()| std::fs::rename(&aside, file));
-    written.map_err(|error| {
-        // What is left of it is of no use to anybody.
-        drop(std::fs::remove_file(&aside));
-        Error::write(file)(error)
-    })
+    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(text.as_bytes()).and_then(|()| whole.commit()));
+    written.map_err(Error::write(file))
 }

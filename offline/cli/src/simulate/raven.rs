@@ -2,6 +2,7 @@
 
 use super::workers::Watch;
 use super::{Wish, commands, files, finish, homing_line, name, runs_away, workers};
+use crate::convert;
 use arm::{JOINTS, Side};
 use recordings::save::{self, StateFormat, TableFormat};
 use recordings::stream::Record;
@@ -15,14 +16,21 @@ use std::process::ExitCode;
 
 pub(super) fn run(wish: &Wish<'_>, model: RobotModel) -> Result<ExitCode, String> {
     let format = wish.format.unwrap_or("mcap");
-    if wish.commands.is_empty() {
-        return made(wish, &model, format);
-    }
-    match wish.arm {
-        "both" => Err("--arm both: a recording's commands are followed by one arm at a time; write --arm gold or green".to_owned()),
-        "green" => followed(wish, &model.with_side(Side::Green), format),
-        _ => followed(wish, &model, format),
-    }
+    let status = match wish.arm {
+        _ if wish.commands.is_empty() => made(wish, &model, format)?,
+        "both" => {
+            return Err(
+                "--arm both: a recording's commands are followed by one arm at a time; write --arm gold or green".to_owned()
+            );
+        }
+        "green" => followed(wish, &model.with_side(Side::Green), format)?,
+        _ => followed(wish, &model, format)?,
+    };
+    // The truth may be among it, for which runs are simulated.
+    let file = Path::new("run").with_extension(format);
+    let of_table = || TableFormat::of_name(&file).map_or(&[][..], TableFormat::losses_of_states);
+    convert::note_all(StateFormat::of_name(&file).map_or_else(of_table, StateFormat::losses));
+    Ok(status)
 }
 
 /// Trajectories that the seed decides.

@@ -9,6 +9,7 @@ mod common;
 mod document;
 mod examples;
 mod gaps;
+mod geometry;
 mod joined;
 mod live;
 mod made;

@@ -95,7 +95,10 @@ fn parameters(physics: &Physics, parameters: &[Parameter]) -> String {
     let row = |parameter: &Parameter| {
         let estimate = Estimate::new(parameter.value, parameter.ci95, parameter.true_unit());
         let by_loop = parameter.output_error_value.map_or_else(String::new, |value| with_unit(value, parameter.true_unit()));
-        let name = parameter_name(physics, &parameter.name);
+        let name = match parameter.along() {
+            Some([along, _]) => format!("shift along {along} ({})", parameter.name),
+            None => parameter_name(physics, &parameter.name),
+        };
         let mut row = vec![name, estimate.plain(), estimate.interval()];
         row.extend(again.then_some(by_loop));
         row.extend((!sure).then(|| determined(parameter)));

@@ -217,8 +217,11 @@ impl Facts<'_> {
 
     fn geometry(&self, at: &str) -> String {
         let length = self.parameter("d_length").map(|length| {
-            let way = if length.value < 0.0 { "shorter" } else { "longer" };
-            format!("is {} {way}", amount(&size(length)))
+            let by = amount(&size(length));
+            match length.along() {
+                Some([_, way]) => format!("is moved by {by} along {way} of the frame before it"),
+                None => format!("is {by} {}", if length.value < 0.0 { "shorter" } else { "longer" }),
+            }
         });
         let twist = self.parameter("d_alpha").map(|twist| format!("is twisted by {}", amount_in(&size(twist), &degrees())));
         let both: Vec<String> = [length, twist].into_iter().flatten().collect();

@@ -19,7 +19,7 @@ pub use extra::Extra;
 pub use fit::{ABSENT, Fit, FloorMethod, Metric, Score, Space, removed_fraction};
 pub use inputs::{Access, Channel, Inputs, Robot, Run, RunKind, RunRole, Simulator, Tool};
 pub use location::{Feature, Interval, Location, Regime, Region, RegionKind, Subsystem};
-pub use parameter::{CiMethod, Identifiable, Parameter, TRUE_UNIT};
+pub use parameter::{ALONG, CiMethod, Identifiable, Parameter, TRUE_UNIT};
 pub use report::{
     Calibration, DataQuality, ExcessRms, Level, MODEL_ERROR, Mismatch, Remaining, Report, SCHEMA_VERSION, SealedCase, Status,
     Timing,

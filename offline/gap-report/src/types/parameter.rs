@@ -64,6 +64,8 @@ names! {
 
 /// Key of the unit that a value has, where the vocabulary has none for it.
 pub const TRUE_UNIT: &str = "x_unit";
+/// Key of the direction of a shift, such as `-y`, in the frame before what is shifted.
+pub const ALONG: &str = "x_along";
 
 impl Parameter {
     /// A parameter in a unit. The interval is put in order and widened to hold the value: a bootstrap need not.
@@ -93,6 +95,14 @@ impl Parameter {
     /// The unit that the value has. The vocabulary has one for each way in which a joint moves; that of a coupling is the moving joint's as well.
     pub fn true_unit(&self) -> &str {
         self.extra.get(TRUE_UNIT).and_then(|unit| unit.as_str()).unwrap_or(&self.unit)
+    }
+
+    /// Of a shift, in the frame before what is shifted: the direction in which it is positive, and that in which it goes.
+    pub fn along(&self) -> Option<[String; 2]> {
+        let along = self.extra.get(ALONG)?.as_str()?;
+        let (negative, axis) = along.strip_prefix('-').map_or((false, along), |axis| (true, axis));
+        let shown = |negative: bool| if negative { format!("\u{2212}{axis}") } else { axis.to_owned() };
+        Some([shown(negative), shown(negative != (self.value < 0.0))])
     }
 
     /// Sets how the interval was found.

@@ -100,6 +100,37 @@ fn twisted(dictionary: &Dictionary) -> Vec<Column> {
     vec![derivative(dictionary, &rebuilt(arm, arm.bodies().to_vec(), turn * arm.tool_pose()), TURN)]
 }
 
+/// A link that is moved along an axis of the frame before it.
+pub(crate) struct Shift {
+    /// Of the coefficient: the parameter is positive along `along`.
+    pub sign: f64,
+    /// The way that is positive; none where the link is longer by it.
+    pub along: Option<&'static str>,
+    /// What the link is longer by, over the coefficient, if it is along the way to the link, or along its joint where that has its
+    /// origin in the frame before.
+    pub longer: Option<f64>,
+}
+
+/// What the form of a link that is moved means in this arm; none for other forms.
+pub(crate) fn shift(arm: &SerialArm, family: &Family) -> Option<Shift> {
+    if family.physics != "link_geometry" {
+        return None;
+    }
+    let (axis, names) = match family.side().strip_prefix("moved along ")? {
+        "x" => (Vector3::x(), ["x", "-x"]),
+        "y" => (Vector3::y(), ["y", "-y"]),
+        _ => (Vector3::z(), ["z", "-z"]),
+    };
+    let body = arm.bodies().get(*family.joints.first()?)?;
+    let way = body.placement.translation.vector.try_normalize(1e-9);
+    let share = way.unwrap_or_else(|| body.placement.rotation * body.joint.axis.normalize()).dot(&axis);
+    let longer = (share.abs() > 0.99).then(|| share.signum());
+    // Along the axis of its joint, as an offset of Denavit and Hartenberg is told.
+    let sign = longer.filter(|_| way.is_none()).unwrap_or(1.0);
+    let said = way.is_some() && longer == Some(1.0);
+    Some(Shift { sign, along: (!said).then_some(names[usize::from(sign < 0.0)]), longer })
+}
+
 /// Direction in which the tool is long, in the last link.
 pub(crate) fn tool_axis(arm: &SerialArm) -> Vector3<f64> {
     let pose = arm.tool_pose();

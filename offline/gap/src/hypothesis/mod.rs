@@ -33,7 +33,7 @@ pub use environment::direction;
 pub(crate) use friction::{AT_MOTOR, STRIBECK_RANGE};
 pub(crate) use gravity::{IN_THE_PLANE, OUT_OF_PLANE, WITH_OTHER_LINKS};
 pub(crate) use inertial::{AT_THE_TIP, CARRIED, ROTOR};
-pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED};
+pub(crate) use kinematic::{TOOL_LENGTH, TOOL_TWIST, TWISTED, shift};
 pub use windows::{ALWAYS, NEVER, Window, Windows, with_both_edges, with_one_edge};
 
 use crate::cell::Channel;

@@ -8,7 +8,7 @@ use crate::aside::Aside;
 
 const BUFFER_BYTES: usize = 1 << 18;
 
-/// A file being written beside its final name; [`WholeFile::finish`] renames it, dropping it before removes it.
+/// A file being written; [`WholeFile::finish`] gives it its name, nothing is left of one that is dropped before.
 #[derive(Debug)]
 pub(crate) struct WholeFile {
     file: BufWriter<File>,
@@ -24,8 +24,8 @@ impl WholeFile {
 
     /// Brings everything to the disk and gives the file its name.
     pub(crate) fn finish(self) -> io::Result<()> {
-        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        self.aside.commit(&file)
+        let _file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        self.aside.commit()
     }
 }
 

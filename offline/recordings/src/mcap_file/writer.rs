@@ -47,7 +47,7 @@ impl Sink for McapSink {
 
     fn finish(self: Box<Self>) -> Result<(), StreamError> {
         let Self { path, body, aside } = *self;
-        let committed = body.finish().and_then(|file| aside.commit(&file).map_err(Trouble::from));
+        let committed = body.finish().and_then(|_file| aside.commit().map_err(Trouble::from));
         committed.map_err(|trouble| trouble.of(&path))
     }
 }

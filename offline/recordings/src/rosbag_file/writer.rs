@@ -55,7 +55,7 @@ impl Sink for RosbagSink {
 
     fn finish(self: Box<Self>) -> Result<(), StreamError> {
         let Self { path, aside, body } = *self;
-        let committed = body.finish().and_then(|file| Ok(aside.commit(&file)?));
+        let committed = body.finish().and_then(|_file| Ok(aside.commit()?));
         committed.map_err(|trouble| trouble.of(&path))
     }
 }

@@ -1,6 +1,7 @@
 //! Robots as text: what [`RobotModel::from_toml`] reads as the same robot again.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 
 use super::controller_model::GAINS;
@@ -11,6 +12,7 @@ use super::urdf_robot::STEP_S;
 use super::{Connection, ControllerModel, Robot, RobotError, RobotModel, UrdfRobot};
 use crate::physics::{Channel, Value};
 use crate::plant::Passive;
+use atomic_write_file::AtomicWriteFile;
 
 impl RobotModel {
     /// The robot as a file that stands for itself: a URDF is in it.
@@ -24,11 +26,10 @@ impl RobotModel {
     /// [`RobotError::File`].
     pub fn save(&self, path: &Path) -> Result<(), RobotError> {
         let failed = |error: std::io::Error| RobotError::File { what: format!("{}: cannot be written: {error}", path.display()) };
-        let aside = path.with_extension(format!("{}.new", std::process::id()));
-        std::fs::write(&aside, self.to_toml()).and_then(|()| std::fs::rename(&aside, path)).map_err(|error| {
-            drop(std::fs::remove_file(&aside));
-            failed(error)
-        })
+        let text = self.to_toml();
+        AtomicWriteFile::open(path)
+            .and_then(|mut whole| whole.write_all(text.as_bytes()).and_then(|()| whole.commit()))
+            .map_err(failed)
     }
 }
 

@@ -7,10 +7,12 @@ use crate::data::Trajectory;
 use crate::error::{TrainingError, hex};
 use crate::preset::Recipe;
 use crate::random::Random;
+use atomic_write_file::AtomicWriteFile;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io::Write as _;
+use std::path::Path;
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -55,10 +57,8 @@ pub(super) fn save(file: &Path, identity: &str, course: &mut Course) -> Result<(
     for numbers in slots(course) {
         bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
     }
-    let mut aside = file.as_os_str().to_owned();
-    aside.push(".new");
-    let aside = PathBuf::from(aside);
-    fs::write(&aside, bytes).and_then(|()| fs::rename(&aside, file)).map_err(|error| failed(error.to_string()))
+    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(&bytes).and_then(|()| whole.commit()));
+    written.map_err(|error| failed(error.to_string()))
 }
 
 /// Puts a checkpoint into a course that has begun.
