@@ -5,7 +5,9 @@
 use crate::held_windows;
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows};
 use crate::intervals::Estimate;
+use crate::noise::Noise;
 use crate::problem::Problem;
+use crate::score::segments;
 use crate::search::{AHEAD, Answer, Effect, Scored, Thresholds, confused};
 use crate::series::{less_means, mean};
 use crate::told::main_cell;
@@ -78,6 +80,21 @@ pub(crate) fn left(problem: &Problem, c: usize, effects: &[Sized]) -> Vec<f64> {
         candidate.take_off(c, coefficients, &mut left);
     }
     left
+}
+
+/// What effects leave of a cell, without what the nominal model may make up for.
+pub(crate) fn left_without(problem: &Problem, c: usize, effects: &[Sized]) -> Vec<f64> {
+    problem.nuisances[c].without(&left(problem, c, effects))
+}
+
+/// Autoregression of what effects leave, per cell.
+pub(crate) fn noise_left(problem: &Problem, effects: &[Sized]) -> Vec<Noise> {
+    let of_cell = |c: usize| {
+        let left = left_without(problem, c, effects);
+        let parts: Vec<&[f64]> = segments(problem, c).into_iter().map(|rows| &left[rows]).collect();
+        Noise::fit(&parts)
+    };
+    (0..problem.cells.len()).map(of_cell).collect()
 }
 
 /// An effect that explains what was fitted and not what was held out.

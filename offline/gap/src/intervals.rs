@@ -1,11 +1,12 @@
 //! 95 % intervals of parameters: leave one block out, shapes and windows linearised.
 
 use crate::cell::Channel;
-use crate::held_out::{Sized, sized_in_a_row};
+use crate::held_out::{Sized, left_without, noise_left, sized_in_a_row};
 use crate::hypothesis::{
     AT_THE_TIP, Candidate, Column, Dictionary, Family, GROUND, LATE_TORQUES, OUT_OF_PLANE, ROTOR, START, STRIBECK_RANGE, are_parts,
     levels_what_fades, rounds,
 };
+use crate::noise::Noise;
 use crate::nominal::Nominal;
 use crate::parallel;
 use crate::parameters::{Named, parameters};
@@ -250,13 +251,13 @@ enum Slope {
 /// Estimates of all effects together. Where a choice of an effect's shape is not decided, the intervals hold what either would say.
 pub fn estimates(dictionary: &Dictionary, scorer: &Scorer, nominal: &Nominal, robot: &Robot, effects: &[Effect]) -> Vec<Estimate> {
     let candidates: Vec<&Candidate> = effects.iter().map(|e| &e.chosen.candidate).collect();
-    let mut all = of_candidates(dictionary, scorer, nominal, robot, &candidates);
+    let mut all = of_candidates(dictionary, nominal, robot, &candidates);
     for (k, estimate) in all.iter_mut().enumerate() {
         estimate.windows = edges(dictionary, scorer, &candidates, (k, effects[k].chosen.score));
         for other in chosen_as_well(dictionary, scorer, &candidates, (k, effects[k].chosen.score)) {
             let mut with = candidates.clone();
             with[k] = &other;
-            estimate.widen(&of_candidates(dictionary, scorer, nominal, robot, &with)[k]);
+            estimate.widen(&of_candidates(dictionary, nominal, robot, &with)[k]);
         }
     }
     all
@@ -324,14 +325,38 @@ fn chosen_as_well(dictionary: &Dictionary, scorer: &Scorer, candidates: &[&Candi
     all
 }
 
+/// Rounds in which the noise is learnt from what the last one left.
+const ROUNDS: usize = 2;
+/// How much more than the least squares may be left by coefficients with another noise, of its RMS.
+const MORE_LEFT: f64 = 1.1;
+
+/// With the noise that candidates leave of each cell, beginning with none that is known: that of the search is what the window makes of white noise, and
+/// weighs what is quick by far more than a model is right about it. Of play, which turns round at once here and slowly in a robot, what is left is no noise
+/// either where much more would be left by it: with none then.
+fn by_what_is_left<'p>(problem: &'p Problem<'p>, candidates: &[&Candidate]) -> Scorer<'p> {
+    let with = |noise: Vec<Noise>| {
+        let scorer = Scorer::new(problem, noise);
+        let fit = scorer.fit(&scorer.grams(candidates.iter().copied()));
+        let sized = sized_in_a_row(candidates.iter().copied(), &fit.coefficients);
+        let left = (0..problem.cells.len()).map(|c| rms(left_without(problem, c, &sized).into_iter())).collect::<Vec<f64>>();
+        let noise = noise_left(problem, &sized);
+        (scorer, noise, left)
+    };
+    let (plain, mut noise, least) = with(vec![Noise::default(); problem.cells.len()]);
+    let mut last = None;
+    for _ in 0..ROUNDS {
+        let (scorer, next, left) = with(noise);
+        noise = next;
+        last = Some((scorer, left));
+    }
+    let play = candidates.iter().any(|candidate| candidate.family.physics == "backlash");
+    let as_good = |left: &[f64]| !play || left.iter().zip(&least).all(|(left, least)| *left <= MORE_LEFT * least);
+    last.filter(|(_, left)| as_good(left)).map_or(plain, |(scorer, _)| scorer)
+}
+
 /// Estimates of candidates together.
-fn of_candidates(
-    dictionary: &Dictionary,
-    scorer: &Scorer,
-    nominal: &Nominal,
-    robot: &Robot,
-    candidates: &[&Candidate],
-) -> Vec<Estimate> {
+fn of_candidates(dictionary: &Dictionary, nominal: &Nominal, robot: &Robot, candidates: &[&Candidate]) -> Vec<Estimate> {
+    let scorer = by_what_is_left(dictionary.problem, candidates);
     // First round: coefficients; second: with the slopes by shape and windows.
     let plain = scorer.grams(candidates.iter().copied());
     let fit = scorer.fit(&plain);

@@ -1,8 +1,8 @@
 //! Coefficients and shapes as the vocabulary's parameters, and back.
 
 use crate::hypothesis::{
-    Candidate, DRIFTS, GROUND, HEATING_S, OUT_OF_PLANE, OWN_STIFFNESS, ROTOR, STRIBECK_RANGE, TOOL_TWIST, TWISTED, shift,
-    torque_scale,
+    Candidate, DRIFTS, GROUND, HEATING_S, OUT_OF_PLANE, OWN_STIFFNESS, ROTOR, STEADY_FORCE, STRIBECK_RANGE, TOOL_TWIST, TWISTED,
+    shift, torque_scale,
 };
 use crate::nominal::Nominal;
 use crate::robot::Robot;
@@ -161,7 +161,7 @@ pub fn parameters(robot: &Robot, nominal: &Nominal, candidate: &Candidate, theta
             let names = [("w_x", "rad"), ("w_y", "rad"), ("w_z", "rad"), ("t_x", "m"), ("t_y", "m"), ("t_z", "m")];
             names.into_iter().zip(theta).map(|((name, unit), value)| named(name, unit, *value)).collect()
         }
-        ("external_contact", "steady force") => vec![named("f_max", "N", theta.iter().map(|f| f * f).sum::<f64>().sqrt())],
+        ("external_contact", STEADY_FORCE) => vec![named("f_max", "N", theta.iter().map(|f| f * f).sum::<f64>().sqrt())],
         ("external_contact", _) => {
             vec![named("k", "N/m", theta[0]), named("x_0", "m", shaped("x_0")), named("p", "1", shaped("p"))]
         }

@@ -4,9 +4,9 @@ use std::time::{Instant, SystemTime};
 
 use gap_report::{
     Access, Artifact, Calibration, Channel as Told, Confusable, DataQuality, Evidence, ExcessRms, Feature, Fit as FitFigure,
-    Format, Inputs, Interval, Level, Location, MODEL_ERROR, Mismatch, Motion, Parameter, Physics, Pictures, Regime, Remaining,
-    Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing, Tool, Verdict,
-    ranked, timestamp,
+    Format, Identifiable, Inputs, Interval, Level, Location, MODEL_ERROR, Mismatch, Motion, Parameter, Physics, Pictures, Regime,
+    Remaining, Report, Role, Run as ToldRun, RunKind, RunRole, Score, Simulator, Space, Status, Subsystem, TestMethod, Timing,
+    Tool, Verdict, ranked, timestamp,
 };
 
 use crate::cell::Channel;
@@ -15,7 +15,7 @@ use crate::corrected::Corrected;
 use crate::found::{Found, Outcome};
 use crate::given::{Given, Options};
 use crate::held_out::Refused;
-use crate::hypothesis::{Candidate, NEVER, UNMODELLED, Window, shift};
+use crate::hypothesis::{Candidate, NEVER, STEADY_FORCE, UNMODELLED, Window, shift};
 use crate::intervals::{Edge, Estimate};
 use crate::pictures;
 use crate::robot::Robot;
@@ -358,6 +358,10 @@ fn told_parameters(found: &Found, candidate: &Candidate, estimate: &Estimate) ->
             named.unit.clone_into(&mut parameter.unit);
             if let Some(unit) = unit_of_coupling(found.robot, candidate, named.name) {
                 parameter.extra.set(gap_report::TRUE_UNIT, unit);
+            }
+            // Bearings carry what the joints do not feel of it.
+            if candidate.family.form == STEADY_FORCE && candidate.columns.len() < 3 {
+                parameter.identifiable = Identifiable::No;
             }
             with_its_way(found.robot, candidate, parameter.method(gap_report::CiMethod::Sandwich))
         })

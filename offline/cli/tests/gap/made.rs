@@ -472,17 +472,36 @@ fn of_one_run_what_came_on_the_way_is_there_in_the_third_that_is_held_out() {
     assert!(fit.after < 0.2 * fit.before, "{fit:?}");
 }
 
-#[test]
-fn a_force_for_a_while_is_no_weight() {
-    let folder = Folder::new("force");
+/// 5 N along (0.6, -0.8, 0).
+fn force_for_a_while() -> Wanted {
     let along = [("n_x", 0.6), ("n_y", -0.8), ("n_z", 0.0)].map(|(name, value)| (name.to_owned(), value));
-    let force = Wanted {
+    Wanted {
         details: along.into_iter().collect(),
         interval: Some([4.0, 8.0]),
         ..wanted("external_contact", None, &[("f_max", 5.0)])
-    };
+    }
+}
+
+#[test]
+fn a_force_that_bearings_carry_a_part_of_is_not_called_known() {
+    let folder = Folder::new("borne");
+    let effects = vec![force_for_a_while()];
     // Walls and steady forces are drawn.
-    let (case, truth) = made(&folder, "f2", &[force], 12.0);
+    let order = Order { seed: 99_103, label: "f1".to_owned(), effects, robot: Kind::Planar, ..Order::default() };
+    let (case, truth) = written(&folder, &order);
+    assert!(!truth[0].effect.parameters.contains_key("k"), "{:?}", truth[0].effect.parameters);
+    let report = case.judged(&folder.file("out"));
+    let first = primary(&report)[0];
+    assert_eq!(first.physics.to_string(), "external_contact", "{}", report.summary);
+    near(first, "f_max", 3.0, 0.1);
+    assert_eq!(first.parameters[0].identifiable, gap_report::Identifiable::No);
+}
+
+#[test]
+fn a_force_for_a_while_is_no_weight() {
+    let folder = Folder::new("force");
+    // Walls and steady forces are drawn.
+    let (case, truth) = made(&folder, "f2", &[force_for_a_while()], 12.0);
     assert!(!truth[0].effect.parameters.contains_key("k"), "{:?}", truth[0].effect.parameters);
     let report = case.judged(&folder.file("out"));
     let first = primary(&report)[0];

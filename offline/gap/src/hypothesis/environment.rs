@@ -13,6 +13,8 @@ use crate::cell::Channel;
 const WALLS: [f64; 5] = [0.5, 0.65, 0.78, 0.88, 0.95];
 /// Exponents of its force.
 const EXPONENTS: [f64; 2] = [1.0, 1.5];
+/// The form of a force that does not change.
+pub(crate) const STEADY_FORCE: &str = "steady force";
 /// The form of a wall.
 pub(crate) const WALL: &str = "wall";
 /// First step by which its normal is turned, rad: half of what the directions are apart.
@@ -49,7 +51,7 @@ pub(super) fn push(dictionary: &Dictionary, all: &mut Vec<Family>) {
     let axes = felt(&tips);
     let bounds = vec![Bound::Free; axes.len()];
     all.push(
-        Family::fixed("external_contact", &[], "steady force", TORQUE, &bounds, move |d| {
+        Family::fixed("external_contact", &[], STEADY_FORCE, TORQUE, &bounds, move |d| {
             let own = own.of(d);
             axes.iter().map(|axis| effort(d, &own, |_| *axis)).collect()
         })

@@ -28,8 +28,8 @@ use std::sync::Arc;
 
 use dictionary::Besides;
 pub use dictionary::{Column, Dictionary};
-pub(crate) use environment::WALL;
 pub use environment::direction;
+pub(crate) use environment::{STEADY_FORCE, WALL};
 pub(crate) use friction::{AT_MOTOR, STRIBECK_RANGE};
 pub(crate) use gravity::{IN_THE_PLANE, OUT_OF_PLANE, WITH_OTHER_LINKS};
 pub(crate) use inertial::{AT_THE_TIP, CARRIED, ROTOR};

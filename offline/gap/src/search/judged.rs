@@ -3,13 +3,13 @@
 use super::explained::explained;
 use super::{Scored, Search, price};
 use crate::cell::Channel;
-use crate::held_out::{left, sized_in_a_row};
+use crate::held_out::{left_without, noise_left, sized_in_a_row};
 use crate::hypothesis::{Candidate, RIPPLE, WALL, are_parts, fades_within, rub_together, shaken};
 use crate::intervals::OF_THE_LOAD;
 use crate::noise::Noise;
 use crate::parallel;
 use crate::problem::Problem;
-use crate::score::{Fit, Gain, Grams, Scorer, segments};
+use crate::score::{Fit, Gain, Grams, Scorer};
 use crate::series::rms;
 
 /// Times its standard error over the blocks that the gain of an effect has to reach, or the ranks of the blocks theirs, which the largest
@@ -179,18 +179,13 @@ impl Search<'_, '_> {
     /// Autoregression of what a set leaves, per cell.
     pub(super) fn noise_left(&self, others: &[Candidate], candidate: &Candidate, fit: &Fit) -> Vec<Noise> {
         let all: Vec<&Candidate> = others.iter().chain([candidate]).collect();
-        let left = self.residuals(&all, fit);
-        let of_cell = |(c, left): (usize, Vec<f64>)| {
-            let parts: Vec<&[f64]> = segments(self.problem, c).into_iter().map(|s| &left[s]).collect();
-            Noise::fit(&parts)
-        };
-        left.into_iter().enumerate().map(of_cell).collect()
+        noise_left(self.problem, &sized_in_a_row(all.iter().copied(), &fit.coefficients))
     }
 
     /// What a set leaves of each cell.
     pub(super) fn residuals(&self, all: &[&Candidate], fit: &Fit) -> Vec<Vec<f64>> {
         let sized = sized_in_a_row(all.iter().copied(), &fit.coefficients);
-        (0..self.problem.cells.len()).map(|c| self.problem.nuisances[c].without(&left(self.problem, c, &sized))).collect()
+        (0..self.problem.cells.len()).map(|c| left_without(self.problem, c, &sized)).collect()
     }
 
     pub(super) fn accepts(&self, scored: &Scored, judged: &Judged) -> bool {

@@ -35,7 +35,7 @@ impl Search<'_, '_> {
             if may_fade(candidate, others) { self.score_of_start(grams, &base, candidate) } else { None }
         });
         // Effects that begin or end on the way: the claims that do something, again, in windows.
-        let windows = self.windows();
+        let windows = self.windows(grams, &base);
         all.sort_by(|a, b| b.seen.total_cmp(&a.seen));
         let mut worth: Vec<Scored> = distinct(&all).into_iter().take(CLAIMS_IN_WINDOWS).filter(|s| s.seen > 3.0).collect();
         let refined = self.refined_often(grams, &base, &all);
