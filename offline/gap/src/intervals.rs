@@ -332,7 +332,8 @@ const MORE_LEFT: f64 = 1.1;
 
 /// With the noise that candidates leave of each cell, beginning with none that is known: that of the search is what the window makes of white noise, and
 /// weighs what is quick by far more than a model is right about it. Of play, which turns round at once here and slowly in a robot, what is left is no noise
-/// either where much more would be left by it: with none then.
+/// either where much more would be left by it: with none then. Nor is there noise to learn of rows that do not follow each other, and of a model that was learnt
+/// from recordings the search knows none.
 fn by_what_is_left<'p>(problem: &'p Problem<'p>, candidates: &[&Candidate]) -> Scorer<'p> {
     let with = |noise: Vec<Noise>| {
         let scorer = Scorer::new(problem, noise);
@@ -343,6 +344,9 @@ fn by_what_is_left<'p>(problem: &'p Problem<'p>, candidates: &[&Candidate]) -> S
         (scorer, noise, left)
     };
     let (plain, mut noise, least) = with(vec![Noise::default(); problem.cells.len()]);
+    if problem.of_points() || problem.from_recording {
+        return plain;
+    }
     let mut last = None;
     for _ in 0..ROUNDS {
         let (scorer, next, left) = with(noise);
