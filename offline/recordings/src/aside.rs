@@ -11,6 +11,10 @@ pub(crate) struct Aside(AtomicWriteFile);
 impl Aside {
     /// Makes the file, empty, for reading and writing.
     pub(crate) fn create(path: &Path) -> std::io::Result<(Self, File)> {
+        // Found out when the file gets its name, its content would be left under another one.
+        if path.is_dir() {
+            return Err(std::io::ErrorKind::IsADirectory.into());
+        }
         let aside = AtomicWriteFile::options().read(true).open(path)?;
         let file = aside.as_file().try_clone()?;
         Ok((Self(aside), file))
