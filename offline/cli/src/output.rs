@@ -1,6 +1,6 @@
 //! Output files appear whole or not at all; what is said goes where somebody still listens.
 
-use atomic_write_file::AtomicWriteFile;
+use outputs::Whole;
 use std::fmt::Arguments;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use std::path::Path;
 /// Writes through `write` into a file that is there when it is complete; on any failure, and when a signal ends the program, nothing is left.
 pub(crate) fn whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), String>) -> Result<(), String> {
     let failed = |cause: std::io::Error| unwritten(path, &cause);
-    let mut buffered = BufWriter::new(AtomicWriteFile::open(path).map_err(failed)?);
+    let (whole, file) = Whole::create(path).map_err(failed)?;
+    let mut buffered = BufWriter::new(file);
     write(&mut buffered)?;
-    let file = buffered.into_inner().map_err(|error| failed(error.into_error()))?;
-    file.commit().map_err(failed)
+    buffered.flush().and_then(|()| whole.commit()).map_err(failed)
 }
 
 /// Writes bytes so.
@@ -60,10 +60,9 @@ pub(crate) fn check_folder(out: &Path, option: &str) -> Result<(), String> {
     }
 }
 
-/// Can there be another file in a folder? Nothing is left of the one that is tried.
+/// Can there be another file in a folder?
 fn check_writable(out: &Path, folder: &Path) -> Result<(), String> {
-    let tried = AtomicWriteFile::open(folder.join(".ravenpose")).and_then(AtomicWriteFile::discard);
-    tried.map_err(|cause| unwritten(out, &cause))
+    outputs::try_in(folder).map_err(|cause| unwritten(out, &cause))
 }
 
 /// Says a line on standard output; see [`say`].

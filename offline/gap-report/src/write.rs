@@ -1,8 +1,6 @@
 //! Onto the disk: report.json and report.html, each written under another name and then renamed, so that nobody reads half a
 //! file.
 
-use atomic_write_file::AtomicWriteFile;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -59,8 +57,7 @@ pub fn json(report: &Report) -> Result<String, WriteError> {
 
 /// A file as a whole or not at all.
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let written = AtomicWriteFile::open(path).and_then(|mut whole| whole.write_all(bytes).and_then(|()| whole.commit()));
-    written.map_err(|source| WriteError::File { path: path.to_owned(), source })
+    outputs::write(path, bytes).map_err(|source| WriteError::File { path: path.to_owned(), source })
 }
 
 /// A time as RFC 3339 in UTC to the second, such as `2026-01-15T10:00:00Z`, for [`Report::created`].

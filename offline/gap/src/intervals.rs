@@ -335,27 +335,28 @@ const MORE_LEFT: f64 = 1.1;
 /// either where much more would be left by it: with none then. Nor is there noise to learn of rows that do not follow each other, and of a model that was learnt
 /// from recordings the search knows none.
 fn by_what_is_left<'p>(problem: &'p Problem<'p>, candidates: &[&Candidate]) -> Scorer<'p> {
-    let with = |noise: Vec<Noise>| {
-        let scorer = Scorer::new(problem, noise);
-        let fit = scorer.fit(&scorer.grams(candidates.iter().copied()));
-        let sized = sized_in_a_row(candidates.iter().copied(), &fit.coefficients);
-        let left = (0..problem.cells.len()).map(|c| rms(left_without(problem, c, &sized).into_iter())).collect::<Vec<f64>>();
-        let noise = noise_left(problem, &sized);
-        (scorer, noise, left)
-    };
-    let (plain, mut noise, least) = with(vec![Noise::default(); problem.cells.len()]);
+    let plain = Scorer::new(problem, vec![Noise::default(); problem.cells.len()]);
     if problem.of_points() || problem.from_recording {
         return plain;
     }
-    let mut last = None;
-    for _ in 0..ROUNDS {
-        let (scorer, next, left) = with(noise);
-        noise = next;
-        last = Some((scorer, left));
+    let fitted = |scorer: &Scorer| scorer.fit(&scorer.grams(candidates.iter().copied())).coefficients;
+    let noise = |coefficients: &[f64]| noise_left(problem, &sized_in_a_row(candidates.iter().copied(), coefficients));
+    let least = fitted(&plain);
+    let mut scorer = Scorer::new(problem, noise(&least));
+    for _ in 1..ROUNDS {
+        let coefficients = fitted(&scorer);
+        scorer = Scorer::new(problem, noise(&coefficients));
     }
-    let play = candidates.iter().any(|candidate| candidate.family.physics == "backlash");
-    let as_good = |left: &[f64]| !play || left.iter().zip(&least).all(|(left, least)| *left <= MORE_LEFT * least);
-    last.filter(|(_, left)| as_good(left)).map_or(plain, |(scorer, _)| scorer)
+    if candidates.iter().any(|candidate| candidate.family.physics == "backlash") {
+        let with_noise = fitted(&scorer);
+        let left = |c: usize, coefficients: &[f64]| {
+            rms(left_without(problem, c, &sized_in_a_row(candidates.iter().copied(), coefficients)).into_iter())
+        };
+        if (0..problem.cells.len()).any(|c| left(c, &with_noise) > MORE_LEFT * left(c, &least)) {
+            return plain;
+        }
+    }
+    scorer
 }
 
 /// Estimates of candidates together.

@@ -27,7 +27,6 @@ pub mod parquet_file;
 pub mod ros;
 pub mod rosbag_file;
 
-mod aside;
 mod columns;
 mod fields;
 mod file;

@@ -9,13 +9,11 @@ use crate::split::{Parts, Split};
 use crate::train::{self, Progress};
 use crate::{figures, load, onnx};
 use arm::Raven2;
-use atomic_write_file::AtomicWriteFile;
 use ravenpose::correction::Quantity;
 use ravenpose::load::LoadCard;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// One row of training in so many has a memory that began a few seconds before.
@@ -248,8 +246,8 @@ fn write_model(out: &Path, chain: &Chain, card: &BTreeMap<String, String>) -> Re
 
 /// Writes a file that is there when it is complete.
 pub(crate) fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), TrainingError> {
-    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(bytes).and_then(|()| whole.commit()));
-    written.map_err(|error| TrainingError::file(file, format!("cannot be written: {error}"), "choose another --out"))
+    outputs::write(file, bytes)
+        .map_err(|error| TrainingError::file(file, format!("cannot be written: {error}"), "choose another --out"))
 }
 
 /// A model that [`train`] wrote.

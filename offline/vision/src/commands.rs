@@ -10,9 +10,7 @@ use crate::outcome::Tracked;
 use crate::rig::{self, Rig};
 use crate::table::read_picks;
 use crate::track::{self, Mode};
-use atomic_write_file::AtomicWriteFile;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A calibrated rig.
@@ -219,6 +217,5 @@ pub fn truth_text(tracked: &Tracked) -> String {
 
 /// A file appears whole or not at all.
 pub(crate) fn whole(file: &Path, text: &str) -> Result<()> {
-    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(text.as_bytes()).and_then(|()| whole.commit()));
-    written.map_err(Error::write(file))
+    outputs::write(file, text.as_bytes()).map_err(Error::write(file))
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::Path;
 
-use crate::aside::Aside;
+use outputs::Whole;
 
 const BUFFER_BYTES: usize = 1 << 18;
 
@@ -12,20 +12,20 @@ const BUFFER_BYTES: usize = 1 << 18;
 #[derive(Debug)]
 pub(crate) struct WholeFile {
     file: BufWriter<File>,
-    aside: Aside,
+    whole: Whole,
 }
 
 impl WholeFile {
     /// Begins the file.
     pub(crate) fn create(path: &Path) -> io::Result<Self> {
-        let (aside, file) = Aside::create(path)?;
-        Ok(Self { file: BufWriter::with_capacity(BUFFER_BYTES, file), aside })
+        let (whole, file) = Whole::create(path)?;
+        Ok(Self { file: BufWriter::with_capacity(BUFFER_BYTES, file), whole })
     }
 
     /// Brings everything to the disk and gives the file its name.
     pub(crate) fn finish(self) -> io::Result<()> {
         let _file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        self.aside.commit()
+        self.whole.commit()
     }
 }
 

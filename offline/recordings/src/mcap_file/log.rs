@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::writer::{Body, Trouble};
-use crate::aside::sync_folder;
 use crate::ros::MessageType;
 use crate::stream::{Record, Sink, StreamError};
 
@@ -143,6 +142,14 @@ fn occupied(part: &Path, error: std::io::Error) -> StreamError {
         place: None,
         what: "is there already, from a run that did not end".to_owned(),
         remedy: "give it another name to keep it, or remove it".to_owned(),
+    }
+}
+
+/// A rename reaches the disk with the folder.
+fn sync_folder(path: &Path) -> std::io::Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => File::open(folder)?.sync_all(),
+        _ => File::open(".")?.sync_all(),
     }
 }
 

@@ -10,9 +10,9 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 
 use super::METADATA_NAME;
-use crate::aside::Aside;
 use crate::ros::{Emitter, MessageType, TOPICS, Unfit};
 use crate::stream::{Record, Sink, StreamError};
+use outputs::Whole;
 
 /// Target size of a chunk before compression, bytes: some 0.9 s of states.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -24,7 +24,7 @@ type Output = NoSeek<BufWriter<File>>;
 pub struct McapSink {
     path: PathBuf,
     body: Body,
-    aside: Aside,
+    whole: Whole,
 }
 
 impl McapSink {
@@ -34,9 +34,9 @@ impl McapSink {
     /// [`StreamError`] where the disk refuses.
     pub fn create(path: &Path, metadata: &[(String, String)]) -> Result<Self, StreamError> {
         let failed = |trouble: Trouble| trouble.of(path);
-        let (aside, file) = Aside::create(path).map_err(|error| failed(error.into()))?;
+        let (whole, file) = Whole::create(path).map_err(|error| failed(error.into()))?;
         let body = Body::new(file, metadata).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), body, aside })
+        Ok(Self { path: path.to_owned(), body, whole })
     }
 }
 
@@ -46,8 +46,8 @@ impl Sink for McapSink {
     }
 
     fn finish(self: Box<Self>) -> Result<(), StreamError> {
-        let Self { path, body, aside } = *self;
-        let committed = body.finish().and_then(|_file| aside.commit().map_err(Trouble::from));
+        let Self { path, body, whole } = *self;
+        let committed = body.finish().and_then(|_file| whole.commit().map_err(Trouble::from));
         committed.map_err(|trouble| trouble.of(&path))
     }
 }

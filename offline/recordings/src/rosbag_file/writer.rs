@@ -8,9 +8,9 @@ use lz4_flex::frame::{BlockMode, BlockSize, FrameEncoder, FrameInfo};
 
 use super::index::{CONNECTIONS, ChunkIndex, bag_header, put_connection, put_record, time};
 use super::{MAGIC, op};
-use crate::aside::Aside;
 use crate::ros::{Emitter, METADATA_TOPIC, Message, TOPICS, Topic, Unfit, encode_pair};
 use crate::stream::{Record, Sink, StreamError};
+use outputs::Whole;
 
 /// Target size of a chunk before compression, bytes: that of ROS.
 const CHUNK_BYTES: usize = 768 << 10;
@@ -30,7 +30,7 @@ pub enum ChunkCompression {
 /// A bag being written; it gets its name when it is complete.
 pub struct RosbagSink {
     path: PathBuf,
-    aside: Aside,
+    whole: Whole,
     body: Body,
 }
 
@@ -40,9 +40,9 @@ impl RosbagSink {
     /// # Errors
     /// [`StreamError`] where the disk refuses.
     pub fn create(path: &Path, metadata: &[(String, String)], compression: ChunkCompression) -> Result<Self, StreamError> {
-        let begun = Aside::create(path).map_err(Trouble::from).and_then(|(aside, file)| {
+        let begun = Whole::create(path).map_err(Trouble::from).and_then(|(whole, file)| {
             let body = Body::new(file, metadata, compression)?;
-            Ok(Self { path: path.to_owned(), aside, body })
+            Ok(Self { path: path.to_owned(), whole, body })
         });
         begun.map_err(|trouble| trouble.of(path))
     }
@@ -54,8 +54,8 @@ impl Sink for RosbagSink {
     }
 
     fn finish(self: Box<Self>) -> Result<(), StreamError> {
-        let Self { path, aside, body } = *self;
-        let committed = body.finish().and_then(|_file| Ok(aside.commit()?));
+        let Self { path, whole, body } = *self;
+        let committed = body.finish().and_then(|_file| Ok(whole.commit()?));
         committed.map_err(|trouble| trouble.of(&path))
     }
 }

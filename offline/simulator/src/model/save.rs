@@ -1,7 +1,6 @@
 //! Robots as text: what [`RobotModel::from_toml`] reads as the same robot again.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 use super::controller_model::GAINS;
@@ -12,7 +11,6 @@ use super::urdf_robot::STEP_S;
 use super::{Connection, ControllerModel, Robot, RobotError, RobotModel, UrdfRobot};
 use crate::physics::{Channel, Value};
 use crate::plant::Passive;
-use atomic_write_file::AtomicWriteFile;
 
 impl RobotModel {
     /// The robot as a file that stands for itself: a URDF is in it.
@@ -26,10 +24,7 @@ impl RobotModel {
     /// [`RobotError::File`].
     pub fn save(&self, path: &Path) -> Result<(), RobotError> {
         let failed = |error: std::io::Error| RobotError::File { what: format!("{}: cannot be written: {error}", path.display()) };
-        let text = self.to_toml();
-        AtomicWriteFile::open(path)
-            .and_then(|mut whole| whole.write_all(text.as_bytes()).and_then(|()| whole.commit()))
-            .map_err(failed)
+        outputs::write(path, self.to_toml().as_bytes()).map_err(failed)
     }
 }
 

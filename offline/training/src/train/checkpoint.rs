@@ -7,11 +7,9 @@ use crate::data::Trajectory;
 use crate::error::{TrainingError, hex};
 use crate::preset::Recipe;
 use crate::random::Random;
-use atomic_write_file::AtomicWriteFile;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::io::Write as _;
 use std::path::Path;
 
 /// The first line.
@@ -57,8 +55,7 @@ pub(super) fn save(file: &Path, identity: &str, course: &mut Course) -> Result<(
     for numbers in slots(course) {
         bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
     }
-    let written = AtomicWriteFile::open(file).and_then(|mut whole| whole.write_all(&bytes).and_then(|()| whole.commit()));
-    written.map_err(|error| failed(error.to_string()))
+    outputs::write(file, &bytes).map_err(|error| failed(error.to_string()))
 }
 
 /// Puts a checkpoint into a course that has begun.
