@@ -1,4 +1,4 @@
-//! Onto the disk: report.json and report.html, each written under another name and then renamed, so that nobody reads half a
+//! Onto the disk: report.json and report.html, neither of which has its name before it is complete, so that nobody reads half a
 //! file.
 
 use std::path::{Path, PathBuf};
