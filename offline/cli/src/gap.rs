@@ -142,7 +142,7 @@ fn quietly(model: &RobotModel, given: &[Given], options: &Options) -> Result<Out
 fn write(outcome: &Outcome, out: &Path) -> Result<(), String> {
     // What cannot be written at all leaves nothing behind.
     drop(gap_report::json(&outcome.report).map_err(|error| error.to_string())?);
-    std::fs::create_dir_all(out).map_err(|error| format!("{}: cannot be made: {error}", out.display()))?;
+    output::make_folder(out)?;
     let corrected = out.join("corrected.toml");
     match &outcome.corrected {
         Some(text) => output::all(&corrected, text.as_bytes())?,

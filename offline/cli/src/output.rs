@@ -60,6 +60,12 @@ pub(crate) fn check_folder(out: &Path, option: &str) -> Result<(), String> {
     }
 }
 
+/// Makes a folder, with those that it is in; one that is there stays.
+pub(crate) fn make_folder(path: &Path) -> Result<(), String> {
+    let failed = |cause| format!("{}: cannot be made: {cause}; check the folder that it is in and its permissions", path.display());
+    std::fs::create_dir_all(path).map_err(failed)
+}
+
 /// Can there be another file in a folder?
 fn check_writable(out: &Path, folder: &Path) -> Result<(), String> {
     outputs::try_in(folder).map_err(|cause| unwritten(out, &cause))

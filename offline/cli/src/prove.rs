@@ -25,7 +25,7 @@ pub(crate) fn run(wish: &Wish) -> Result<ExitCode, String> {
         .map_err(|error| format!("where this program stands is not known ({error}); call it by its path"))?;
     let (generate, score) = (beside(&own, "ravenpose-generate")?, beside(&own, "ravenpose-score")?);
     let jobs = wish.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).to_string();
-    std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
+    output::make_folder(wish.out)?;
     begin(wish, &sha256(&read(&own)?))?;
 
     let seed = wish.seed.to_string();

@@ -164,10 +164,13 @@ fn track(cameras: &Path, scene: &Path, out: &Path, mode: Mode, overlay: Option<&
     let tracked = commands::track(cameras, scene, mode, &mut |done, all| progress.at(done as u64, all as u64));
     progress.end();
     let tracked = tracked.map_err(|error| error.to_string())?;
-    commands::write_truth(&tracked, out).map_err(|error| error.to_string())?;
+    output::all(out, commands::truth_text(&tracked).as_bytes())?;
     let _ = output::say(format_args!("{}", tracked_words(&tracked)));
     if let Some(folder) = overlay {
-        let page = commands::write_overlay(cameras, scene, &tracked, folder).map_err(|error| error.to_string())?;
+        let text = commands::overlay_text(cameras, scene, &tracked).map_err(|error| error.to_string())?;
+        output::make_folder(folder)?;
+        let page = folder.join("index.html");
+        output::all(&page, text.as_bytes())?;
         say!("{}: the frames, with what was found in them", page.display());
     }
     Ok(ExitCode::SUCCESS)
@@ -286,7 +289,7 @@ fn record(
 }
 
 fn mark(rig: &Path, images: Option<&Path>, port: u16) -> Result<ExitCode, String> {
-    let marking = Marking::open(rig, images).map_err(|error| error.to_string())?;
+    let marking = Marking::open(rig, images, |path, text| output::all(path, text.as_bytes())).map_err(|error| error.to_string())?;
     let file = marking.file();
     let server = Server::bind(marking, port).map_err(|error| error.to_string())?;
     say!("{}: open it in a browser of this machine; Finish or Ctrl-C ends", server.url());

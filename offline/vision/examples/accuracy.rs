@@ -34,7 +34,7 @@ fn main() -> Result<(), vision::Error> {
         for (mode, label) in [(Mode::Default, "default"), (Mode::Paper, "paper")] {
             let calibrated = commands::calibrate(folder, mode)?;
             let file = std::env::temp_dir().join(format!("ravenpose-accuracy-{}.toml", std::process::id()));
-            commands::write_cameras(&calibrated, &file)?;
+            std::fs::write(&file, commands::cameras_text(&calibrated)).map_err(vision::Error::write(&file))?;
             let (begun, cpu_s) = (Instant::now(), cpu_s());
             let tracked = commands::track(&file, folder, mode, &mut |_, _| {});
             let (seconds, cpu_s) = (begun.elapsed().as_secs_f64(), self::cpu_s() - cpu_s);

@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn measured(folder: &std::path::Path) -> Result<String, vision::Error> {
     let calibrated = commands::calibrate(folder, Mode::Default)?;
     let file = folder.join("cameras.toml");
-    commands::write_cameras(&calibrated, &file)?;
+    std::fs::write(&file, commands::cameras_text(&calibrated)).map_err(vision::Error::write(&file))?;
     let tracked = commands::track(&file, folder, Mode::Default, &mut |_, _| {})?;
     let truth = read_truth(&folder.join("truth.csv"))?;
     let rig = vision::rig::read(folder)?;

@@ -67,7 +67,7 @@ fn stages(folder: &std::path::Path) -> Result<(), vision::Error> {
     following.line("rims and pose near the last ones", images.len(), "frame");
 
     let file = folder.join("cameras.toml");
-    commands::write_cameras(&calibrated, &file)?;
+    std::fs::write(&file, commands::cameras_text(&calibrated)).map_err(vision::Error::write(&file))?;
     let whole = Watch::start();
     let tracked = commands::track(&file, folder, Mode::Default, &mut |_, _| {})?;
     let seconds = whole.line("track, all of it", tracked.rows.len(), "frame");

@@ -1,4 +1,4 @@
-//! What the command line does: folders and files in, files and results out.
+//! What the command line does: folders and files in, results and the text of files out.
 
 use crate::adjustment::Priors;
 use crate::bundle::{self, UNKNOWN_BEARING_PX, reprojection_rms_px};
@@ -11,7 +11,7 @@ use crate::rig::{self, Rig};
 use crate::table::read_picks;
 use crate::track::{self, Mode};
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A calibrated rig.
 #[derive(Debug)]
@@ -128,14 +128,6 @@ pub fn cameras_text(calibrated: &Calibrated) -> String {
     cameras_file::text(&calibrated.cameras, &calibrated.method)
 }
 
-/// Writes `cameras.toml`.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write_cameras(calibrated: &Calibrated, file: &Path) -> Result<()> {
-    whole(file, &cameras_text(calibrated))
-}
-
 /// Measures the recording of a scene folder; `progress` is told frames done and in all.
 ///
 /// # Errors
@@ -148,32 +140,20 @@ pub fn track(cameras: &Path, folder: &Path, mode: Mode, progress: &mut dyn FnMut
     track::track(&cameras, &bearing_px, &rig, folder, mode, progress)
 }
 
-/// Writes `index.html` into a folder: what was found and suspended in the frames of a measured recording ([`crate::overlay`]).
+/// A page of what was found and suspended in the frames of a measured recording ([`crate::overlay`]).
 ///
 /// # Errors
-/// If files cannot be read or written.
-pub fn write_overlay(cameras: &Path, folder: &Path, tracked: &Tracked, out: &Path) -> Result<PathBuf> {
+/// If files cannot be read.
+pub fn overlay_text(cameras: &Path, folder: &Path, tracked: &Tracked) -> Result<String> {
     let rig = rig::read(folder)?;
     let cameras: Vec<crate::Camera> = cameras_file::read(cameras, &rig)?.into_iter().map(|known| known.camera).collect();
-    let page = crate::overlay::sheet(&cameras, &rig, folder, tracked)?;
-    std::fs::create_dir_all(out).map_err(Error::write(out))?;
-    let file = out.join("index.html");
-    whole(&file, &page)?;
-    Ok(file)
-}
-
-/// Writes `truth.csv`.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write_truth(tracked: &Tracked, file: &Path) -> Result<()> {
-    whole(file, &truth_text(tracked))
+    crate::overlay::sheet(&cameras, &rig, folder, tracked)
 }
 
 /// The columns of `truth.csv` by ball are named after its colours in this order where it has them (the contract's order).
 const ORDER: [&str; 3] = ["green", "yellow", "red"];
 
-/// Rows of `truth.csv`; pose cells of a lost frame are empty. `# start_unix_s` stands before them where the recording has it.
+/// The text of `truth.csv`; pose cells of a lost frame are empty. `# start_unix_s` stands before them where the recording has it.
 pub fn truth_text(tracked: &Tracked) -> String {
     let mut order: Vec<usize> = ORDER.iter().filter_map(|name| tracked.balls.iter().position(|ball| ball == name)).collect();
     order.extend((0..3).filter(|k| !ORDER.contains(&tracked.balls[*k].as_str())));
@@ -213,9 +193,4 @@ pub fn truth_text(tracked: &Tracked) -> String {
         }
     }
     text
-}
-
-/// A file appears whole or not at all.
-pub(crate) fn whole(file: &Path, text: &str) -> Result<()> {
-    outputs::write(file, text.as_bytes()).map_err(Error::write(file))
 }

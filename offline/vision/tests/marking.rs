@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Folder, data};
-use std::io::{Read, Write};
+use std::io::{Read, Write as _};
 use std::net::TcpStream;
 use vision::marking::server::Server;
-use vision::marking::{Mark, Marker, Marking};
+use vision::marking::{Mark, Marker, Marking, Write};
 
 fn scene(name: &str) -> Option<Folder> {
     Some(Folder::of_scene(name, &data("vision-rendered")?.join("easy"), 1))
@@ -32,9 +32,11 @@ fn post(port: u16, path: &str, body: &str) -> (u16, String) {
     ask(port, &format!("POST {path} HTTP/1.1\r\nHost: localhost:{port}\r\nX-Ravenpose: mark"), body)
 }
 
+const WRITE: Write = |path, text| std::fs::write(path, text).map_err(|error| vision::Error::write(path)(error).to_string());
+
 /// A running page and its port.
 fn served(folder: &Folder) -> (std::thread::JoinHandle<usize>, u16) {
-    let server = Server::bind(Marking::open(&folder.0, None).expect("a rig"), 0).expect("a port");
+    let server = Server::bind(Marking::open(&folder.0, None, WRITE).expect("a rig"), 0).expect("a port");
     let port = server.url().trim_end_matches('/').rsplit(':').next().and_then(|port| port.parse().ok()).expect("a port");
     (std::thread::spawn(move || server.run()), port)
 }
@@ -64,7 +66,7 @@ fn a_click_is_written_at_once_and_calibration_reads_it() {
     assert_eq!(post(port, "/finish", "{}").0, 200);
     let count = running.join().expect("an end");
     assert_eq!(count + 1, before.matches("\"pixel\"").count());
-    assert!(Marking::open(&own.0, None).expect("again").json().contains("\"new\""), "an unmarked marker stays known");
+    assert!(Marking::open(&own.0, None, WRITE).expect("again").json().contains("\"new\""), "an unmarked marker stays known");
     vision::commands::calibrate(&own.0, vision::track::Mode::Default).expect("cameras");
 }
 
@@ -111,15 +113,15 @@ fn a_rig_without_images_or_with_a_foreign_table_is_refused_in_one_line() {
         assert!(text.contains(word) && !text.contains('\n'), "{text}");
     };
     let empty = Folder::new("no-images");
-    line(Marking::open(&own.0, Some(&empty.0)), "cam0");
+    line(Marking::open(&own.0, Some(&empty.0), WRITE), "cam0");
     own.edit("markers.csv", |text| text.replace("marker,x_mm", "object,x_mm"));
-    line(Marking::open(&own.0, None), "markers.csv");
+    line(Marking::open(&own.0, None, WRITE), "markers.csv");
 }
 
 #[test]
 fn a_file_that_cannot_be_written_leaves_the_marks_as_they_were() {
     let Some(own) = scene("unwritable") else { return };
-    let mut marking = Marking::open(&own.0, None).expect("a rig");
+    let mut marking = Marking::open(&own.0, None, WRITE).expect("a rig");
     let before = marking.json();
     std::fs::remove_file(own.0.join("markers.csv")).expect("file");
     std::fs::create_dir_all(own.0.join("markers.csv/in-the-way")).expect("folder");

@@ -5,6 +5,7 @@ mod commands;
 mod raven;
 mod workers;
 
+use crate::output;
 use simulator::RobotModel;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -69,7 +70,7 @@ pub(crate) fn run(wish: &Wish<'_>) -> Result<ExitCode, String> {
 fn files(wish: &Wish<'_>, runs: usize, format: &str) -> Result<(Vec<PathBuf>, PathBuf), String> {
     let files: Vec<PathBuf> = (1..=runs).map(|run| wish.out.join(format!("run_{run:04}.{format}"))).collect();
     let summary = wish.out.join("simulation.txt");
-    std::fs::create_dir_all(wish.out).map_err(|error| format!("{}: cannot be made: {error}", wish.out.display()))?;
+    output::make_folder(wish.out)?;
     if let Some(file) = files.iter().chain([&summary]).find(|file| file.exists()) {
         return Err(format!("{}: is there already; choose another --out or remove it", file.display()));
     }
@@ -90,7 +91,7 @@ fn runs_away(robot: &str) -> String {
 
 /// Writes the summary and says in one line what was made.
 fn finish(wish: &Wish<'_>, model: &RobotModel, runs: &str, summary: &Path, text: &str) -> Result<(), String> {
-    crate::output::all(summary, text.as_bytes())?;
+    output::all(summary, text.as_bytes())?;
     let seed = wish.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
     say!("{}: {runs}, robot {}{seed}", wish.out.display(), model.name());
     Ok(())

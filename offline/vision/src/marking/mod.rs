@@ -39,9 +39,13 @@ pub struct Mark {
     pub pixel: [f64; 2],
 }
 
+/// Puts the text of a file in its place; a reason where it cannot.
+pub type Write = fn(&Path, &str) -> std::result::Result<(), String>;
+
 /// What is marked in a rig so far; each change is written at once.
 #[derive(Debug)]
 pub struct Marking {
+    write: Write,
     rig: Rig,
     folder: PathBuf,
     images: Vec<PathBuf>,
@@ -51,11 +55,11 @@ pub struct Marking {
 
 impl Marking {
     /// Opens a rig folder: images from `images/NAME.*` if that is given, else `markers/NAME.*`, the first of `frames/NAME/`, or
-    /// `chessboard/NAME.*`; markers from `markers.csv` and `marker_places.csv`, where they exist.
+    /// `chessboard/NAME.*`; markers from `markers.csv` and `marker_places.csv`, where they exist, which `write` puts there anew.
     ///
     /// # Errors
     /// If the rig or its tables are not sound, or a camera has no image of the rig's size.
-    pub fn open(folder: &Path, images: Option<&Path>) -> Result<Self> {
+    pub fn open(folder: &Path, images: Option<&Path>, write: Write) -> Result<Self> {
         let rig = rig::read(folder)?;
         let names: Vec<String> = rig.cameras.iter().map(|camera| camera.name.clone()).collect();
         let images = names.iter().map(|name| image_of(folder, images, name)).collect::<Result<Vec<_>>>()?;
@@ -75,7 +79,7 @@ impl Marking {
         let mut known = if places.exists() { read_places(&places)? } else { Places::new() };
         known.extend(picks.iter().map(|pick: &Pick| (pick.marker.clone(), pick.position_m)));
         let markers = known.into_iter().map(|(name, at)| Marker { name, place_mm: [at.x, at.y, at.z].map(mm) }).collect();
-        Ok(Self { rig, folder: folder.to_owned(), images, markers, marks })
+        Ok(Self { write, rig, folder: folder.to_owned(), images, markers, marks })
     }
 
     /// How many marks there are.
@@ -164,8 +168,8 @@ impl Marking {
         for Marker { name, place_mm: [x, y, z] } in &self.markers {
             let _ = writeln!(places, "{name},{x},{y},{z}");
         }
-        crate::commands::whole(&self.folder.join(PLACES), &places).map_err(|error| error.to_string())?;
-        crate::commands::whole(&self.file(), &self.csv()).map_err(|error| error.to_string())
+        (self.write)(&self.folder.join(PLACES), &places)?;
+        (self.write)(&self.file(), &self.csv())
     }
 
     /// Rows camera by camera, in the order of the markers.

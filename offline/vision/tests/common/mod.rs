@@ -88,7 +88,7 @@ pub(crate) fn run(folder: &Path, mode: Mode) -> Result<Tracked, vision::Error> {
         let file = own.0.join("cameras.toml");
         (Some(own), file)
     };
-    commands::write_cameras(&commands::calibrate(folder, mode)?, &file)?;
+    std::fs::write(&file, commands::cameras_text(&commands::calibrate(folder, mode)?)).expect("written");
     let tracked = commands::track(&file, folder, mode, &mut |_, _| {});
     drop(own);
     tracked
