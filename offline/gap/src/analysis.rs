@@ -424,12 +424,13 @@ fn analyse_with(
     let effects =
         if problem.of_points() { robot.joint_count().max(options.thresholds.effects) } else { options.thresholds.effects };
     let thresholds = Thresholds { effects, ..options.thresholds };
-    let mut answer = search(&problem, &mut dictionary, &thresholds, &mut |line| {
+    let mut trace = |line| {
         if options.trace {
             // Nobody may listen any more.
             let _ = writeln!(std::io::stderr(), "{line}");
         }
-    });
+    };
+    let mut answer = search(&problem, &mut dictionary, &thresholds, &mut trace);
     let screen_s = begun.elapsed().as_secs_f64() - read_s;
     progress("sizes and intervals");
     let held_problem = prior.put_on(Problem::new(&robot, &nominal, &held, BLOCK_S));
@@ -449,6 +450,7 @@ fn analyse_with(
         &mut estimates,
         &|answer| sizes(&dictionary, answer),
         &thresholds,
+        &mut trace,
     );
     let stays = |(own, effect): (&Candidate, &Effect)| own.same_form(&effect.chosen.candidate);
     if said.len() != answer.effects.len() || !said.iter().zip(&answer.effects).all(stays) {

@@ -8,7 +8,7 @@ use crate::intervals::Estimate;
 use crate::noise::Noise;
 use crate::problem::Problem;
 use crate::score::segments;
-use crate::search::{AHEAD, Answer, Effect, Scored, Thresholds, confused};
+use crate::search::{AHEAD, Answer, Effect, Scored, Thresholds, confused, describe};
 use crate::series::{less_means, mean};
 use crate::told::main_cell;
 
@@ -137,6 +137,7 @@ impl HeldOut<'_> {
         estimates: &mut Vec<Estimate>,
         sizes: &dyn Fn(&Answer) -> Vec<Estimate>,
         thresholds: &Thresholds,
+        trace: &mut dyn FnMut(String),
     ) -> Option<Refused> {
         let (mut refused, mut anew) = (None, 0);
         // Each step takes an effect back, or a rival that holds there, or a plainer one; a rival that no longer does is not exchanged again.
@@ -144,6 +145,14 @@ impl HeldOut<'_> {
             let all = sized(&answer.effects, estimates);
             let of = |k: usize| Some((k, self.fate(answer, estimates, &all, k, thresholds, anew < ANEW)?));
             let Some((k, fate)) = (0..all.len()).rev().find_map(of) else { return refused };
+            trace(format!("  held out: {}", describe(&answer.effects[k].chosen)));
+            match &fate {
+                Fate::Otherwise(rival) | Fate::Exchanged(rival) => {
+                    trace(format!("   instead: {}", describe(&answer.effects[k].rivals[*rival])));
+                }
+                Fate::Needless => trace("   need not be said".to_owned()),
+                Fate::Refused => trace("   does not hold".to_owned()),
+            }
             match fate {
                 Fate::Otherwise(other) => {
                     anew += 1;
@@ -336,7 +345,7 @@ fn is_needless(answer: &Answer, estimates: &[Estimate], k: usize) -> bool {
     let place = |effect: &Effect| effect.chosen.candidate.family.joints.first().copied();
     let of_one_place = |other: &Effect| place(other).is_none() || place(effect).is_none() || place(other) == place(effect);
     let beside_larger = answer.effects.iter().any(|other| other.gain.nats > effect.gain.nats && of_one_place(other));
-    let asked = if effect.chosen.candidate.is_by_load_and_level() { plainer(answer, k).is_some() } else { beside_larger };
+    let asked = plainer(answer, k).is_some() || (beside_larger && !effect.chosen.candidate.is_by_load_and_level());
     asked && effect.is_named() && estimates[k].may_be_nothing(&effect.chosen.candidate.family)
 }
 
@@ -346,10 +355,17 @@ fn is_large(answer: &Answer, k: usize) -> bool {
     answer.effects[k].gain.nats > LARGE * largest
 }
 
-/// The rival that an effect is where its own number is nothing: friction by load and a level is the level.
+/// The rival that an effect is where its own number is nothing: friction by load and a level is the level, a memory whose many numbers gain next to
+/// nothing beside a constant is the constant.
 fn plainer(answer: &Answer, k: usize) -> Option<usize> {
     let own = &answer.effects[k].chosen;
-    if own.candidate.is_by_load_and_level() { level(answer, k, NEAR * own.score) } else { None }
+    if own.candidate.is_by_load_and_level() {
+        plain(answer, k, "coulomb_friction", NEAR * own.score)
+    } else if !own.candidate.family.limits.is_empty() {
+        plain(answer, k, "joint_offset", own.score - confused(own.score))
+    } else {
+        None
+    }
 }
 
 /// The rival that a Stribeck curve is which says nothing of slow motion: one as narrow as may be, whose height is that of standstills, or whose
@@ -357,22 +373,22 @@ fn plainer(answer: &Answer, k: usize) -> Option<usize> {
 fn level_of_a_curve(answer: &Answer, estimates: &[Estimate], k: usize) -> Option<usize> {
     let own = &answer.effects[k].chosen;
     if own.candidate.is_a_spike() {
-        level(answer, k, NEAR * own.score)
+        plain(answer, k, "coulomb_friction", NEAR * own.score)
     } else if estimates[k].is_a_level() {
-        level(answer, k, own.score - confused(own.score))
+        plain(answer, k, "coulomb_friction", own.score - confused(own.score))
     } else {
         None
     }
 }
 
-/// Plain dry friction of an effect's joint among its rivals, of this score at least, if it is not said besides.
-fn level(answer: &Answer, k: usize, least: f64) -> Option<usize> {
+/// A plain effect on an effect's joint among its rivals, of this score at least, if it is not said besides.
+fn plain(answer: &Answer, k: usize, physics: &str, least: f64) -> Option<usize> {
     let effect = &answer.effects[k];
     let joints = &effect.chosen.candidate.family.joints;
     let is_there = |rival: &Scored| answer.effects.iter().any(|other| other.chosen.candidate.same_claim(&rival.candidate));
     effect.rivals.iter().position(|rival| {
         let family = &rival.candidate.family;
-        family.physics == "coulomb_friction" && family.joints == *joints && rival.score >= least && !is_there(rival)
+        family.physics == physics && family.joints == *joints && rival.score >= least && !is_there(rival)
     })
 }
 

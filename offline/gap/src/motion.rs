@@ -161,6 +161,11 @@ impl Motion {
         raw.iter().zip(self.quick_deflection(&raw)).enumerate().map(of_joint).collect()
     }
 
+    /// Deflection of each joint as it was recorded, not smoothed; none where the joints have no encoders.
+    pub(crate) fn raw_deflection(&self) -> Option<Vec<Vec<f64>>> {
+        deflection_of(&self.run)
+    }
+
     /// The window of what is so slow that link and motor accelerate alike.
     fn slow(&self) -> Window {
         Window::new(DEFLECTION_SIGMA_S.max(self.window.sigma_s()), self.run.dt_s)

@@ -1,11 +1,12 @@
-//! Elastic joints that shake each other after a fast motion: their links accelerate in ways that no motor shows, so that the nominal model, which
-//! has its accelerations from the motors, says neither what their torques are nor what their cables bear.
+//! What cables bear beyond the nominal model, from a simulation's own deflections. Elastic joints shake each other after a fast motion: their links
+//! accelerate in ways that no motor shows, so that the nominal model, which has its accelerations from the motors, says neither what their torques
+//! are nor what their cables bear.
 
 use crate::motion::Motion;
 use crate::nominal::{Load, Nominal};
 use crate::pair::{Pair, held};
 use crate::robot::Robot;
-use crate::series::robust_deviation;
+use crate::series::{rms, robust_deviation};
 
 /// Times its usual size above which the nominal model does not hold for the simulation,
 const BEYOND: f64 = 10.0;
@@ -13,12 +14,17 @@ const BEYOND: f64 = 10.0;
 const MARGIN_S: f64 = 0.06;
 /// Moving rows below which nobody knows what is usual.
 const ENOUGH: usize = 20;
+/// Noise of a simulation's deflection, as a share of it, up to which it says what its cable bears wherever it is: what remembers its load counts
+/// every turn of it, and noise turns with each row.
+const QUIET: f64 = 0.01;
+/// Share of its deflection that the nominal model may usually miss then: what misses more has other reasons than its load.
+const OTHERWISE: f64 = 0.1;
 
 /// Where the joints of a simulation shake each other.
 #[derive(Debug, Clone, Default)]
 pub struct Shaking {
-    /// What the cable of each drive bears beyond its nominal load at each row, N·m or N: 0 where it does not shake. Empty where recording
-    /// or simulation have no encoders at the joints.
+    /// What the cable of each drive bears beyond its nominal load at each row, N·m or N: 0 where nobody knows better. Empty where recording or
+    /// simulation have no encoders at the joints.
     borne: Vec<Vec<f64>>,
     /// Rows at which some cable shakes.
     somewhere: Vec<bool>,
@@ -29,6 +35,7 @@ impl Shaking {
     pub fn new(robot: &Robot, nominal: &Nominal, pair: &Pair, loads: Option<&[Load]>) -> Self {
         let (Some(sim), Some(loads), Some(_)) = (&pair.sim, loads, &pair.real.deflection) else { return Self::default() };
         let Some(seen) = &sim.deflection else { return Self::default() };
+        let raw = sim.raw_deflection().unwrap_or_default();
         let (coupling, shares) = (robot.coupling(), robot.strain_shares());
         let n = robot.joint_count();
         let mut somewhere = vec![false; pair.real.rows.len()];
@@ -37,14 +44,23 @@ impl Shaking {
             if compliance <= 0.0 {
                 return vec![0.0; pair.real.rows.len()];
             }
-            let missed = |(&i, load): (&usize, &Load)| -> f64 {
-                let strain: f64 = (0..n).map(|j| coupling[(drive, j)] * seen[j][i]).sum();
-                strain - nominal.late_s[drive] * sim.drive_velocity[drive][i] - nominal.strain(&shares, drive, &load.link)
+            let strain =
+                |deflection: &[Vec<f64>], i: usize| -> f64 { (0..n).map(|j| coupling[(drive, j)] * deflection[j][i]).sum() };
+            let strained: Vec<f64> = loads.iter().map(|load| nominal.strain(&shares, drive, &load.link)).collect();
+            let missed = |(&i, strained): (&usize, &f64)| -> f64 {
+                strain(seen, i) - nominal.late_s[drive] * sim.drive_velocity[drive][i] - strained
             };
-            let missed: Vec<f64> = pair.real.rows.iter().zip(loads).map(missed).collect();
+            let missed: Vec<f64> = pair.real.rows.iter().zip(&strained).map(missed).collect();
             let shaken = far_off(&missed, pair, sim, drive, 0.0);
             somewhere.iter_mut().zip(&shaken).for_each(|(some, own)| *some |= own);
-            missed.iter().zip(shaken).map(|(missed, shaken)| if shaken { missed / compliance } else { 0.0 }).collect()
+            let usually = robust_deviation(missed.iter().copied());
+            let whole: Vec<f64> = (0..raw.first().map_or(0, Vec::len)).map(|i| strain(&raw, i)).collect();
+            let is_its_load = usually <= OTHERWISE * rms(strained.iter().copied()) && is_quiet(&whole);
+            missed
+                .iter()
+                .zip(shaken)
+                .map(|(missed, shaken)| if shaken || is_its_load { missed / compliance } else { 0.0 })
+                .collect()
         };
         let borne = (0..n).map(of_drive).collect();
         Self { borne, somewhere }
@@ -61,6 +77,13 @@ impl Shaking {
         let shaken = pair.sim.as_ref().map_or_else(Vec::new, |sim| far_off(missed, pair, sim, joint, noise));
         self.somewhere.iter().zip(shaken).enumerate().filter(|(_, (some, own))| **some && *own).map(|(row, _)| row)
     }
+}
+
+/// Is the noise of a series small beside it? Fourth differences hold little else.
+fn is_quiet(series: &[f64]) -> bool {
+    let differences = series.windows(5).map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
+    // Of white noise they are larger by the root of 1 + 16 + 36 + 16 + 1.
+    rms(differences) / 70.0_f64.sqrt() <= QUIET * rms(series.iter().copied())
 }
 
 /// Rows at which something is missed by far more than usually where the drive moves, and than `least`, with a margin; of a drive that is held
@@ -99,6 +122,16 @@ mod tests {
 
     fn rows(marked: &[bool]) -> Vec<usize> {
         (0..marked.len()).filter(|k| marked[*k]).collect()
+    }
+
+    #[test]
+    fn noise_is_told_from_what_shakes() {
+        // 10 Hz at 1 kHz, about a constant, with or without the steps of a sensor of a fiftieth of it.
+        let shakes = |i: u32| 2.0 + (0.001 * f64::from(i) * 10.0 * std::f64::consts::TAU).sin();
+        let sensed = |step: f64| (0..1000).map(|i| (shakes(i) / step).round() * step).collect::<Vec<f64>>();
+        assert!(is_quiet(&sensed(1e-6)));
+        assert!(!is_quiet(&sensed(0.1)));
+        assert!(is_quiet(&[]));
     }
 
     #[test]
