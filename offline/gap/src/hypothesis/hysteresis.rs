@@ -94,12 +94,7 @@ pub(super) fn push(dictionary: &Dictionary, j: usize, usual: f64, all: &mut Vec<
                 vec![d.strain_of(j, bent.iter().zip(load).map(|(x, load)| per_share * (x - load)).collect())]
             },
         );
-        let follow = move |s: &[f64], theta: &[f64]| {
-            let mut shape = s.to_vec();
-            shape[0] = (1.0 - theta[0]).clamp(straight[0], straight[1]);
-            shape
-        };
-        all.push(family.limited(&limits).following(follow).penalised(3.0));
+        all.push(family.limited(&limits).telling(0, |theta| 1.0 - theta[0]).penalised(3.0));
     }
 }
 

@@ -57,8 +57,8 @@ pub enum Bound {
 /// Columns for a shape.
 type Columns = dyn Fn(&Dictionary, &[f64]) -> Vec<Column> + Send + Sync;
 
-/// A shape with the numbers that follow the coefficients fitted to it.
-pub type Follow = dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync;
+/// A number of a shape that the coefficients fitted to it tell.
+pub type Told = dyn Fn(&[f64]) -> f64 + Send + Sync;
 
 /// Numbers that follow another: the shape before, and the one to be tried.
 pub type Carry = dyn Fn(&[f64], &mut [f64]) + Send + Sync;
@@ -94,8 +94,8 @@ pub struct Family {
     pub penalty_nats: f64,
     /// What the other numbers of its shape follow when one is refined.
     pub carry: Option<Arc<Carry>>,
-    /// Numbers of its shape that its coefficients tell.
-    pub follow: Option<Arc<Follow>>,
+    /// The number of its shape that its coefficients tell.
+    pub told: Option<(usize, Arc<Told>)>,
     columns: Arc<Columns>,
     /// Least size of its coefficient, where it has parts.
     pub least: f64,
@@ -147,7 +147,7 @@ impl Family {
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             carry: None,
-            follow: None,
+            told: None,
             columns: Arc::new(move |dictionary, _| columns(dictionary)),
             least: 0.0,
             apart: None,
@@ -182,7 +182,7 @@ impl Family {
             bounds: bounds.to_vec(),
             penalty_nats: 0.0,
             carry: None,
-            follow: None,
+            told: None,
             columns: Arc::new(columns),
             least: 0.0,
             apart: None,
@@ -241,10 +241,10 @@ impl Family {
         self
     }
 
-    /// With numbers that the coefficients tell: of a shape and its coefficients, the shape that agrees with them.
+    /// With a number of its shape that the coefficients tell.
     #[must_use]
-    pub fn following(mut self, follow: impl Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync + 'static) -> Self {
-        self.follow = Some(Arc::new(follow));
+    pub fn telling(mut self, number: usize, told: impl Fn(&[f64]) -> f64 + Send + Sync + 'static) -> Self {
+        self.told = Some((number, Arc::new(told)));
         self
     }
 

@@ -12,6 +12,9 @@ use crate::score::{Fit, Grams};
 /// Most steps of a shape whose numbers are refined at once, and the gain of one after which there is no other, nats.
 const STEPS: usize = 25;
 const ENOUGH: f64 = 0.05;
+/// Most steps after which a shape agrees with its coefficients, and how far off it may be then.
+const AGREEING: usize = 5;
+const AGREES: f64 = 3e-3;
 /// Starts of such a shape, per form of a claim, and share of what the best claim sees that a claim has to see to be refined from them.
 const MANY: usize = 4;
 const SEEN_OF_BEST: f64 = 0.3;
@@ -35,7 +38,8 @@ impl Search<'_, '_> {
         let family = best.family.clone();
         let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
-        let (mut least, mut theta) = self.scorer.fitted(base, best);
+        let (agreeing, mut least, mut theta) = self.agreeing(base, best.clone());
+        *best = agreeing;
         for _ in 0..STEPS {
             let moves = self.moves(base, best, &free, &slopes_of(self.dictionary, best, &theta, &free));
             // No further at once than a third of what a number can be.
@@ -44,14 +48,13 @@ impl Search<'_, '_> {
                 return;
             }
             let whole = (0.33 / furthest.max(1e-12)).min(1.0);
-            let told = family.follow.as_ref().map_or_else(|| best.shape.clone(), |follow| follow(&best.shape, &theta));
             let there = [1.0, 0.4, 0.12, 0.03].into_iter().find_map(|part| {
-                let mut shape: Vec<f64> = best.shape.iter().zip(&told).map(|(here, there)| here + part * (there - here)).collect();
+                let mut shape = best.shape.clone();
                 for (k, by) in free.iter().zip(&moves) {
                     shape[*k] = (shape[*k] + part * whole * by).clamp(family.limits[*k][0], family.limits[*k][1]);
                 }
                 let candidate = Candidate::new(self.dictionary, &family, &shape, best.windows.as_ref());
-                let (misfit, own) = if candidate.shows() { self.scorer.fitted(base, &candidate) } else { return None };
+                let (candidate, misfit, own) = if candidate.shows() { self.agreeing(base, candidate) } else { return None };
                 (misfit < least).then_some((candidate, misfit, own))
             });
             let Some((candidate, misfit, own)) = there else { return };
@@ -61,6 +64,34 @@ impl Search<'_, '_> {
                 return;
             }
         }
+    }
+
+    /// A candidate of which the number that its coefficients tell agrees with them, as far as it can; with its misfit and coefficients.
+    fn agreeing(&self, base: &Grams, candidate: Candidate) -> (Candidate, f64, Vec<f64>) {
+        let family = candidate.family.clone();
+        let (misfit, theta) = self.scorer.fitted(base, &candidate);
+        let mut now = (candidate, misfit, theta);
+        let Some((k, told)) = &family.told else { return now };
+        let [low, high] = family.limits[*k];
+        let off = |theta: &[f64], shape: &[f64]| told(theta).clamp(low, high) - shape[*k];
+        let mut by = off(&now.2, &now.0.shape);
+        let mut step = by;
+        for _ in 0..AGREEING {
+            let mut shape = now.0.shape.clone();
+            shape[*k] = (shape[*k] + step).clamp(low, high);
+            let done = shape[*k] - now.0.shape[*k];
+            if by.abs() < AGREES || done == 0.0 {
+                break;
+            }
+            let other = Candidate::new(self.dictionary, &family, &shape, now.0.windows.as_ref());
+            let (misfit, theta) = self.scorer.fitted(base, &other);
+            let its = off(&theta, &shape);
+            // A secant; where it is off the more the further it went, half of the way on.
+            let slope = (its - by) / done;
+            step = if slope < -1e-3 { -its / slope } else { 0.5 * its };
+            (by, now) = (its, (other, misfit, theta));
+        }
+        now
     }
 
     /// Where the free numbers of a shape should go, of their slopes. One that stands at its limit and would go beyond stays, and the others
