@@ -75,19 +75,19 @@ fn common(physics: &str, form: &str, name: &str) -> f64 {
         ("stribeck_friction", "v_s" | "a") => 0.35,
         ("cable_hysteresis", "z_m") | ("load_dependent_friction" | "torque_ripple", _) => 0.3,
         ("payload", "m_p") if form == AT_THE_TIP => 0.25,
-        ("cable_creep", "T_k") | ("external_contact", "p") => 0.2,
+        ("cable_creep", "T_k") | ("external_contact", "p") | ("gravity_direction", _) => 0.2,
         // How steeply dry friction turns round says how late it is.
         ("measurement_delay", _) if form == LATE_TORQUES[0] => 0.2,
         ("cable_creep", "J_k") | ("cable_hysteresis", "a") | ("thermal_drift", "kappa_T") => 0.1,
         ("cable_hysteresis" | "thermal_drift", _) => 0.15,
-        ("cable_stretch" | "gravity_direction", _) | ("external_contact", "k") => 0.12,
+        ("cable_stretch", _) | ("external_contact", "k") => 0.12,
         ("payload", "m_p") => 0.06,
         ("stribeck_friction", _) => 0.05,
         ("external_contact", "f_max") => 0.04,
         ("payload" | "link_inertia" | "external_contact", _) => 0.08,
         ("link_geometry", _) => 0.03,
         ("motor_torque_scale" | "frame_misalignment" | "measurement_delay", _) => 0.02,
-        ("transmission_ratio" | "pulley_eccentricity", _) => 0.008,
+        ("transmission_ratio", _) => 0.008,
         ("joint_offset", _) => 0.006,
         _ => 0.015,
     }
@@ -198,6 +198,8 @@ fn possible(physics: &str, form: &str, named: &Named) -> [f64; 2] {
         | ("thermal_drift", "T")
         | ("stribeck_friction", "v_s")
         | ("pulley_eccentricity", "period") => [0.0, f64::INFINITY],
+        // No more fades than there is.
+        ("thermal_drift", "kappa_T") => [f64::NEG_INFINITY, 1.0],
         ("stribeck_friction", "a") => STRIBECK_RANGE,
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     }

@@ -285,6 +285,13 @@ impl Facts<'_> {
         match self.parameter("kappa_T") {
             Some(kappa) => {
                 let way = if kappa.value < 0.0 { "rises" } else { "falls" };
+                // More than twice of all that there is: until it has ended, a size makes up for its time constant.
+                if kappa.ci95[1] - kappa.ci95[0] > 2.0 {
+                    return format!(
+                        "friction in {at} {way} as the motor warms up, which the simulation lacks; how far it will go, and how fast, these recordings are too \
+                         short to tell"
+                    );
+                }
                 let by = amount_in(&size(kappa), &per_cent());
                 format!("friction in {at} {way} by {by} as the motor warms up{within}, which the simulation lacks")
             }

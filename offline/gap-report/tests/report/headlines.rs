@@ -230,6 +230,15 @@ fn an_amplifiers_offset_is_no_scale_of_one() {
     assert_eq!(headline(&verdict), "The motor of the elbow joint gives a constant torque that the simulation lacks.");
 }
 
+#[test]
+fn a_fading_that_had_no_time_to_end_has_no_size() {
+    let mut verdict = verdict(&Physics::ThermalDrift, &["elbow"], Motion::Revolute, &[("kappa_T", 0.27), ("T", 10.9)]);
+    verdict.parameters[0].ci95 = [-39.2, 1.0];
+    let expected = "Friction in the elbow joint falls as the motor warms up, which the simulation lacks; how far it will go, and how fast, these \
+                    recordings are too short to tell.";
+    assert_eq!(headline(&verdict), expected);
+}
+
 /// With all parameters, with none, at no joint, at three, linear or turning: a sentence that stands.
 #[test]
 fn every_physics_has_a_sentence_whatever_is_known() {
