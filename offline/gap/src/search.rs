@@ -13,7 +13,7 @@ mod settle;
 
 pub(crate) use judged::is_uneven;
 use judged::{shares, window_noise};
-pub(crate) use likeliest::{complexity, confused, likelihood, score_scale};
+pub(crate) use likeliest::{confused, likelihood, numbers_beyond, score_scale};
 
 use crate::hypothesis::{Candidate, Dictionary, UNMODELLED, Windows, library};
 use crate::problem::Problem;

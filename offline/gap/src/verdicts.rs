@@ -20,7 +20,7 @@ use crate::intervals::{Edge, Estimate};
 use crate::pictures;
 use crate::robot::Robot;
 use crate::run::{Extent, Run};
-use crate::search::{Effect, Scored, complexity, confused, is_uneven, likelihood};
+use crate::search::{Effect, Scored, confused, is_uneven, likelihood, numbers_beyond};
 use crate::split::{cut, held_out_of};
 use crate::told::{cell_name, cell_quantity, cell_unit, joints, main_cell, told};
 use crate::unexplained::{Pattern, Unexplained};
@@ -216,7 +216,7 @@ fn bare(robot: &Robot, runs: &[Extent], given: &[Given], options: &Options, mut 
 /// Weight of a rival beside the claim that was chosen, whose own is 1. A larger claim that holds the chosen one, and had to be better by more
 /// than it is, is not the likelier one.
 fn weight_beside(chosen: &Scored, rival: &Scored) -> f64 {
-    let more = (complexity(&rival.candidate) - complexity(&chosen.candidate)).max(0.0);
+    let more = numbers_beyond(&rival.candidate, &chosen.candidate).max(0.0);
     likelihood(rival.score, chosen.score, more).exp().min(1.0)
 }
 
