@@ -87,6 +87,8 @@ fn wrong_numbers_are_refused_with_line_and_element() {
         refused(&with("").replacen(from, to, 1))
     };
     assert!(changed(r#"xyz="0 0 0.3""#, r#"xyz="0 0 0.3 junk""#).contains("line 10, joint two: xyz of <origin> is `0 0 0.3 junk`"));
+    let in_mm = changed(r#"xyz="0 0 0.3""#, r#"xyz="0 0 300""#);
+    assert!(in_mm.contains("line 10, joint two: its origin is 300 m away; lengths of a URDF are in metres"), "{in_mm}");
     assert!(changed(r#"xyz="0 0 0.3""#, r#"xyz="0 nan 0.3""#).contains("expected three finite numbers"));
     assert!(changed(r#"rpy="1 2 3""#, r#"rpy="1 2""#).contains("rpy of <origin>"));
     assert!(changed(r#"rpy="1 2 3""#, r#"rpy="1 2 3" quat_xyzw="0 0 0 1""#).contains("both rpy and quat_xyzw"));

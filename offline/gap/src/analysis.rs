@@ -20,7 +20,7 @@ use crate::nominal::Nominal;
 use crate::pair::Pair;
 use crate::problem::Problem;
 use crate::robot::Robot;
-use crate::run::{Both, Extent, Run, alike, as_noisy, common};
+use crate::run::{Both, Extent, Run, alike, as_noisy, common, in_one_unit_of_time};
 use crate::run_error::RunError;
 use crate::search::{Answer, Effect, Thresholds, search};
 use crate::split::{HELD_OUT, held_out_of, split};
@@ -281,6 +281,7 @@ fn analyse_with(
         let sim = match &one.sim {
             Some((sim, _)) => {
                 let mut sim = Run::new(sim, &robot)?;
+                in_one_unit_of_time(&real, &sim)?;
                 if let Some(lag_s) = lag::of_commands(&real, &sim) {
                     sim.start_s -= lag_s;
                     clocks.push(another_clock(one, lag_s));

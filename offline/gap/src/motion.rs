@@ -161,7 +161,7 @@ impl Motion {
         raw.iter().zip(self.quick_deflection(&raw)).enumerate().map(of_joint).collect()
     }
 
-    /// Deflection of each joint as it was recorded, not smoothed; none where the joints have no encoders.
+    /// Deflection of each joint on the recording's clock, not smoothed; none where the joints have no encoders.
     pub(crate) fn raw_deflection(&self) -> Option<Vec<Vec<f64>>> {
         deflection_of(&self.run)
     }

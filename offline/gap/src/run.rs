@@ -557,6 +557,25 @@ fn jitter(series: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
+/// Units that a time is told in by mistake, per s, and how near to one a ratio of clocks is that unit.
+const UNITS_OF_TIME: [(f64, &str); 3] = [(1e3, "ms"), (1e6, "µs"), (1e9, "ns")];
+const NEAR_A_UNIT: f64 = 0.01;
+
+/// Are the times of a recording and of its simulation told in one unit?
+///
+/// # Errors
+/// [`RunError::UnitOfTime`].
+pub fn in_one_unit_of_time(real: &Run, sim: &Run) -> Result<(), RunError> {
+    for (long, short) in [(real, sim), (sim, real)] {
+        let times = long.dt_s / short.dt_s;
+        if let Some((_, unit)) = UNITS_OF_TIME.iter().find(|(per_s, _)| (times / per_s - 1.0).abs() < NEAR_A_UNIT) {
+            let (run, other) = (long.id.clone(), short.id.clone());
+            return Err(RunError::UnitOfTime { run, other, times: format!("{times:.0}"), unit });
+        }
+    }
+    Ok(())
+}
+
 /// The common stretch of a recording and its simulation, sample for sample, on the recording's clock.
 ///
 /// # Errors

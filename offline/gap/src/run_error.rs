@@ -77,6 +77,18 @@ pub enum RunError {
         /// Its joints.
         joints: usize,
     },
+    /// A time in another unit.
+    #[error("{run}: its rows are {times} times as far apart as those of {other}: a time in {unit}; give t_s in seconds")]
+    UnitOfTime {
+        /// File of the run.
+        run: String,
+        /// That of its recording or simulation.
+        other: String,
+        /// How much further apart.
+        times: String,
+        /// The unit that it has.
+        unit: &'static str,
+    },
     /// Nothing overlaps.
     #[error(
         "{sim}: its time ({sim_s}) and that of the recording {run} ({run_s}) do not overlap; give the runs in the same order, on one clock"

@@ -116,6 +116,7 @@ pub(crate) fn outcome(
     };
     let detected = report.status != Status::NoMismatch;
     report.mismatch = Mismatch { detected, p_value: None, excess_rms: excess(found), extra: gap_report::Extra::default() };
+    doubt_beside_unknowns(&mut verdicts);
     report.verdicts = ranked(verdicts);
     report.corrected_model = artifact;
     report.remaining = remaining(found);
@@ -230,13 +231,38 @@ fn total_weight(effect: &Effect) -> f64 {
 /// How probable a claim is at most that was taken in place of one that fits better: so many were right in opened sets (8 of 11).
 const SECOND: f64 = 0.75;
 
-/// And at most where something without a name is at the same joint: what no known physics says, another one says in part. Such names were right
-/// in 2 of 18 of two opened sets, and in none of 6 that left far more than noise nearly all the time.
-const BESIDE_AN_UNKNOWN: f64 = 0.2;
-
 /// And at most where its own interval holds that there is nothing: of three such names in an opened set two were wrong. (Not of hysteresis, whose
 /// share of a straight spring says that alone; both of these were right.)
 const MAY_BE_NOTHING: f64 = 0.5;
+
+/// And at most where something without a name is in the same channel of the same joint, or in what its controller does: what no known physics says,
+/// another one says in part. Of 18 such names in two opened sets 16 were wrong; in none of these sets are both there.
+const BESIDE_AN_UNKNOWN: f64 = 0.5;
+
+/// Takes names that stand beside something without one for no likelier than that, and all that they are confused with.
+fn doubt_beside_unknowns(verdicts: &mut [Verdict]) {
+    let is_unknown = |verdict: &&Verdict| verdict.role == Role::Primary && verdict.physics == Physics::Unmodelled;
+    let unknown: Vec<Location> = verdicts.iter().filter(is_unknown).map(|verdict| verdict.location.clone()).collect();
+    let beside = |place: &Location| {
+        unknown.iter().any(|other| {
+            let same_place = other.joint == place.joint || other.joint.iter().any(|joint| place.joint.contains(joint));
+            same_place && (other.channel == place.channel || other.subsystem == Subsystem::Controller)
+        })
+    };
+    let doubted = |verdict: &Verdict| {
+        let is_named = !matches!(verdict.physics, Physics::Unmodelled | Physics::None);
+        verdict.role == Role::Primary && is_named && verdict.probability > BESIDE_AN_UNKNOWN && beside(&verdict.location)
+    };
+    let shares: Vec<(u64, f64)> =
+        verdicts.iter().filter(|verdict| doubted(verdict)).map(|v| (v.effect, BESIDE_AN_UNKNOWN / v.probability)).collect();
+    for (effect, share) in shares {
+        for verdict in verdicts.iter_mut().filter(|verdict| verdict.effect == effect) {
+            verdict.probability *= share;
+            verdict.set_probability = verdict.set_probability.map(|set| set * share);
+            verdict.summary = verdict.summary.is_some().then(|| gap_report::headline(verdict));
+        }
+    }
+}
 
 /// The primary verdict of an effect and its alternatives.
 fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, threshold: f64, artifact: Artifact) -> Vec<Verdict> {
@@ -247,12 +273,9 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
     let total = total_weight(effect);
     let candidate = &effect.chosen.candidate;
     let cell = main_cell(found.floors, candidate, &estimate.coefficients);
-    let leaves = found.unexplained.as_ref().is_some_and(|left| left.cell == cell);
-    let unknown = |other: &Effect| !other.is_named() && share_a_joint(&other.chosen.candidate, candidate);
-    let unknown = leaves || found.answer.effects.iter().any(unknown);
     let family = &candidate.family;
     let nothing = family.physics != "cable_hysteresis" && estimate.may_be_nothing(family);
-    let caps = [(unknown, BESIDE_AN_UNKNOWN), (effect.second, SECOND), (nothing, MAY_BE_NOTHING)];
+    let caps = [(effect.second, SECOND), (nothing, MAY_BE_NOTHING)];
     let at_most = caps.iter().filter(|(holds, _)| *holds).fold(1.0, |least: f64, (_, cap)| least.min(*cap));
     let probability = (1.0 / total).min(at_most);
     let physics = physics(candidate);
@@ -336,10 +359,6 @@ fn verdicts_of(found: &Found, k: usize, effect: &Effect, estimate: &Estimate, th
             )
         });
     std::iter::once(verdict).chain(alternatives.collect::<Vec<_>>()).collect()
-}
-
-fn share_a_joint(one: &Candidate, other: &Candidate) -> bool {
-    one.family.joints.iter().any(|joint| other.family.joints.contains(joint))
 }
 
 fn physics(candidate: &Candidate) -> Physics {

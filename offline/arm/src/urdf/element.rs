@@ -5,6 +5,9 @@ use roxmltree::Node;
 
 use super::UrdfError;
 
+/// No part of an arm is as far from the one before, m: such lengths are millimetres.
+const FURTHEST_M: f64 = 30.0;
+
 /// First bytes of all lines.
 pub(super) struct Lines(Vec<usize>);
 
@@ -105,6 +108,11 @@ impl<'a> Element<'a> {
     pub(super) fn origin(&self) -> Result<IsometryMatrix3<f64>, UrdfError> {
         let Some(origin) = self.child("origin")? else { return Ok(IsometryMatrix3::identity()) };
         let position = origin.vector("xyz")?.unwrap_or_else(Vector3::zeros);
+        if position.norm() > FURTHEST_M {
+            return Err(
+                origin.contradiction(format!("its origin is {:.0} m away; lengths of a URDF are in metres", position.norm()))
+            );
+        }
         let turned = origin.vector("rpy")?;
         let quaternion: Option<[f64; 4]> = origin.numbers("quat_xyzw", "four finite numbers")?;
         let rotation = match (turned, quaternion) {

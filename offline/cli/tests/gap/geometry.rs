@@ -1,7 +1,7 @@
 //! Links that are otherwise than the robot's file has them.
 
-use crate::common::{Folder, holds, primary, wanted, written};
-use gap_report::{ALONG, Status};
+use crate::common::{Folder, case_of, holds, primary, wanted, written};
+use gap_report::{ALONG, Role, Status};
 use generator::order::{Kind, Order};
 
 #[test]
@@ -23,4 +23,19 @@ fn a_link_that_is_moved_across_its_length_is_told_with_the_way() {
     let (how, page) = ("is moved by 2.0", std::fs::read_to_string(folder.file("out/report.html")).expect("page"));
     assert!(report.summary.contains(how) && report.summary.contains(&format!("along {shown}")), "{}", report.summary);
     assert!(page.contains(&format!("shift along {shown} (d_length)")));
+}
+
+#[test]
+fn a_frame_that_is_hardly_off_is_no_sure_link() {
+    // A third of the noise: a turn and a shift of the camera's frame predict no worse than a link that is moved, and had a probability of 0.06 for their
+    // six numbers.
+    let folder = Folder::new("hardly");
+    let (case, _) = case_of(&folder, "full", 557_738_847, "8f6e281f9d33");
+    let report = case.judged(&folder.file("out"));
+    let all = || report.verdicts.iter().filter(|verdict| verdict.effect == 1);
+    let named = |physics: &str| all().find(|verdict| verdict.physics.to_string() == physics).expect("named");
+    let (link, frame) = (named("link_geometry"), named("frame_misalignment"));
+    assert!(link.role == Role::Primary && link.probability < 0.8, "{}", link.probability);
+    assert!(frame.probability > 0.2, "{}", frame.probability);
+    assert!(link.confusable_with.iter().any(|other| other.physics == frame.physics));
 }

@@ -1,8 +1,7 @@
 //! Cases that the generator makes, so that something is asserted where ../shared is absent.
 
 use crate::common::{
-    Case, Folder, case_of, done, holds, made, named, near, parameter, primary, report, text, wanted, with_columns, with_effect,
-    written,
+    Case, Folder, case_of, done, holds, made, named, near, parameter, primary, report, text, wanted, with_effect, written,
 };
 use gap_report::{Channel, RegionKind, Report, Status};
 use generator::order::{Kind, Order, Sealed, Wanted};
@@ -236,61 +235,6 @@ fn a_wall_that_is_touched_for_a_moment_is_no_agreement() {
     let report = case.judged(&folder.file("out"));
     assert_ne!(report.status, Status::NoMismatch, "{}", report.summary);
     assert!(report.mismatch.detected && !primary(&report).is_empty());
-}
-
-#[test]
-fn lost_counts_that_drift_as_warmth_does_are_not_warmth_alone() {
-    // Three losses at the same times of both runs: a position that drifts predicts the other run, and leaves three times the noise of each.
-    let folder = Folder::new("lost");
-    let lost = Wanted { physics: "outside:missed_counts".to_owned(), severity: Some(3.0), ..Wanted::default() };
-    let order = Order { seed: 906, label: "mc6".to_owned(), block: "outside".to_owned(), effects: vec![lost], ..Order::default() };
-    let (case, _) = written(&folder, &order);
-    let report = case.judged(&folder.file("out"));
-    assert_eq!(report.status, Status::PartlyExplained, "{}", report.summary);
-    let told = primary(&report);
-    let unmodelled = told.iter().find(|verdict| verdict.physics.to_string() == "unmodelled").expect("something without a name");
-    assert_eq!((unmodelled.location.channel, &unmodelled.location.joint[..]), (Channel::Transmission, &["elbow".to_owned()][..]));
-    assert!(told.iter().all(|verdict| verdict.probability <= 0.2 || verdict.physics.to_string() == "unmodelled"), "{told:?}");
-}
-
-#[test]
-fn a_name_beside_something_unknown_at_the_same_joint_is_only_possible() {
-    // Lost counts were a drift of the position as well, and friction that goes with the position a dry one, with probabilities of 1 and 0.88.
-    for (id, part) in [("16f7bd80a204", "thermal_drift"), ("a41f80eb30b1", "coulomb_friction")] {
-        let folder = Folder::new("beside");
-        let (case, _) = case_of(&folder, "full", 557_738_847, id);
-        let report = case.judged(&folder.file("out"));
-        assert_eq!(report.status, Status::PartlyExplained, "{}", report.summary);
-        let [unknown, named] = primary(&report)[..] else { panic!("{}", report.summary) };
-        assert_eq!((unknown.physics.to_string().as_str(), named.physics.to_string().as_str()), ("unmodelled", part));
-        assert!(named.probability <= 0.2 && report.summary.contains(". Possibly the "), "{}", report.summary);
-    }
-}
-
-#[test]
-fn what_shakes_an_arm_faster_than_it_moves_is_no_agreement() {
-    // Within three rows, 60 ms, half of it turns round: it was taken for noise, and everything for agreement, with a probability of 1.
-    const HZ: f64 = 2.7;
-    let folder = Folder::new("shaken");
-    let (mut case, _) = made(&folder, "null", &[], 12.0);
-    let shaking = |column: &str, row: usize, value: f64| {
-        let by = if column == "tau_1_nm" { 0.008 * (std::f64::consts::TAU * HZ * 1e-3 * row as f64).sin() } else { 0.0 };
-        Some(value + by)
-    };
-    for (k, path) in case.real.iter_mut().enumerate() {
-        *path = with_columns(&folder, &format!("shaken-{k}.csv"), path, shaking);
-    }
-    let out = folder.file("out");
-    let report = case.judged(&out);
-    assert_eq!(report.status, Status::Unmodelled, "{}", report.summary);
-    let first = primary(&report)[0];
-    assert_eq!((first.physics.to_string().as_str(), first.location.channel), ("unmodelled", Channel::JointTorque));
-    assert!(report.summary.contains("shoulder"), "{}", report.summary);
-    assert!(report.remaining.explained_share.is_none());
-    let depends = report.remaining.depends_on.unwrap_or_default().join(", ");
-    let told = depends.split_whitespace().find_map(|word| word.parse::<f64>().ok()).expect("a frequency");
-    // A run tells frequencies 0.08 Hz apart.
-    assert!((told - HZ).abs() < 0.08, "{depends}");
 }
 
 #[test]

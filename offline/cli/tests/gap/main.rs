@@ -17,4 +17,5 @@ mod made;
 mod program;
 mod refused;
 mod sides;
+mod unnamed;
 mod watch;

@@ -200,6 +200,9 @@ fn a_simulation_of_another_time_is_refused_with_both_spans() {
     let sim = base.folder.write("later.csv", later.join("\n") + "\n");
     let case = Case { sim: vec![sim], real: vec![base.case.real[0].clone()], robot: base.case.robot.clone() };
     refused(&case.gap(&base.out()), &base.out(), &["later.csv", "100.0", "do not overlap", "same order"]);
+    // Nor is one in milliseconds another motion.
+    let ms = |_: usize, old: &str| format!("{:.0}", 1e3 * old.parse::<f64>().expect("time"));
+    base.refuses("ms.csv", &base.changed("t_s", ms), &["ms.csv", "1000 times", "a time in ms", "give t_s in seconds"]);
     // One time that is off by years must not ask for the memory of years.
     let last = base.real.len() - 1;
     let jump = base.changed("t_s", |k, old| if k == last { "1e9".to_owned() } else { old.to_owned() });

@@ -6,7 +6,7 @@ use crate::{DataQuality, Level, Physics, Report, Status, Verdict};
 
 /// From this probability on a verdict is told without `most likely`.
 const SURE: f64 = 0.9;
-/// Below it, only as a possibility.
+/// Up to it, only as a possibility.
 const LIKELY: f64 = 0.5;
 
 /// One sentence on one verdict: what the robot has and the simulation lacks, where, how much with its 95 % interval in brackets,
@@ -31,7 +31,7 @@ fn unbroken(verdict: &Verdict) -> String {
     let hedge = match verdict.probability {
         _ if matches!(verdict.physics, Physics::None | Physics::Unmodelled) => "",
         p if p >= SURE => "",
-        p if p >= LIKELY => "most likely ",
+        p if p > LIKELY => "most likely ",
         _ => "possibly ",
     };
     format!("{}.", capital(&format!("{hedge}{said}")))

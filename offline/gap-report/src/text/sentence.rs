@@ -287,6 +287,7 @@ impl Facts<'_> {
                 let way = if kappa.value < 0.0 { "rises" } else { "falls" };
                 // More than twice of all that there is: until it has ended, a size makes up for its time constant.
                 if kappa.ci95[1] - kappa.ci95[0] > 2.0 {
+                    let way = if kappa.ci95[0] < 0.0 && kappa.ci95[1] > 0.0 { "changes" } else { way };
                     return format!(
                         "friction in {at} {way} as the motor warms up, which the simulation lacks; how far it will go, and how fast, these recordings are too \
                          short to tell"

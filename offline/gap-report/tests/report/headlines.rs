@@ -234,9 +234,15 @@ fn an_amplifiers_offset_is_no_scale_of_one() {
 fn a_fading_that_had_no_time_to_end_has_no_size() {
     let mut verdict = verdict(&Physics::ThermalDrift, &["elbow"], Motion::Revolute, &[("kappa_T", 0.27), ("T", 10.9)]);
     verdict.parameters[0].ci95 = [-39.2, 1.0];
-    let expected = "Friction in the elbow joint falls as the motor warms up, which the simulation lacks; how far it will go, and how fast, these \
-                    recordings are too short to tell.";
-    assert_eq!(headline(&verdict), expected);
+    let expected = |way: &str| {
+        format!(
+            "Friction in the elbow joint {way} as the motor warms up, which the simulation lacks; how far it will go, and how fast, these \
+             recordings are too short to tell."
+        )
+    };
+    assert_eq!(headline(&verdict), expected("changes"));
+    verdict.parameters[0].ci95 = [0.02, 2.4];
+    assert_eq!(headline(&verdict), expected("falls"));
 }
 
 /// With all parameters, with none, at no joint, at three, linear or turning: a sentence that stands.

@@ -39,6 +39,9 @@ impl Search<'_, '_> {
         let free: Vec<usize> = (0..family.shape.len()).filter(|k| family.steps[*k].is_some()).collect();
         let span = |k: usize| family.limits[k][1] - family.limits[k][0];
         let (agreeing, mut least, mut theta) = self.agreeing(base, best.clone());
+        if !least.is_finite() {
+            return;
+        }
         *best = agreeing;
         for _ in 0..STEPS {
             let moves = self.moves(base, best, &free, &slopes_of(self.dictionary, best, &theta, &free));
@@ -86,7 +89,12 @@ impl Search<'_, '_> {
             let other = Candidate::new(self.dictionary, &family, &shape, now.0.windows.as_ref());
             let (misfit, theta) = self.scorer.fitted(base, &other);
             let its = off(&theta, &shape);
-            // A secant; where it is off the more the further it went, half of the way on.
+            // It went too far.
+            if its.abs() >= by.abs() {
+                step = 0.5 * done;
+                continue;
+            }
+            // A secant; where the slope tells nothing, half of the way on.
             let slope = (its - by) / done;
             step = if slope < -1e-3 { -its / slope } else { 0.5 * its };
             (by, now) = (its, (other, misfit, theta));
